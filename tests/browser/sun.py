@@ -1,4 +1,4 @@
-"""Checks the page of `antumbra view --sun` in a browser: sun.py CHROMIUM ANTUMBRA FOLDER [SCENE [WIDTHxHEIGHT]]
+"""Checks the page of `antumbra view --day` in a browser: sun.py CHROMIUM ANTUMBRA FOLDER [SCENE [WIDTHxHEIGHT]]
 
 Hours in colours with their legend, shadows by a slider, clicks on points, their diagram and table, saving, other cameras and back
 to the picture; no request to anywhere else, nothing that sticks out to the side. Screenshots are left in FOLDER. Times are
@@ -19,7 +19,7 @@ from playwright.sync_api import sync_playwright
 BROWSER, PROGRAM, FOLDER = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3])
 SCENE = sys.argv[4] if len(sys.argv) > 4 else "builtin:city:20000"
 SIZE = sys.argv[5] if len(sys.argv) > 5 else "400x300"
-DAY = ["--sun", "2025-06-21", "--lat", "48.2082", "--lon", "16.3738"]
+DAY = ["--day", "2025-06-21", "--lat", "48.2082", "--lon", "16.3738"]
 QUIET = ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking"]
 QUIET += ["--disable-component-update", "--disable-sync"]
 VIEWS = {
@@ -125,7 +125,9 @@ def check(context, name):
     finished(page, "shadows", f"Math.abs(status.hour - {8 + (steps - 1) / 4}) < 0.1")
     print(f"{name}: {steps} times of the slider took {time.monotonic() - begun:.2f} s")
 
-    # Another camera and back: the same hours.
+    # Another camera and back: the same hours. A phone has scrolled to the slider.
+    page.locator("#picture").scroll_into_view_if_needed()
+    box = page.locator("#picture").bounding_box()
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
     page.mouse.down()
     page.mouse.move(box["x"] + box["width"] / 2 + 60, box["y"] + box["height"] / 2 + 10, steps=6)

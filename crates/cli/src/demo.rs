@@ -11,6 +11,7 @@ use antumbra_bake::{
 use antumbra_image::{Image, Rgb8Image, Window, heatmap};
 use antumbra_lab::{Gain, collect_rays, gain, make_directory, write_json};
 use antumbra_load::MemorySize;
+use antumbra_map::{Panel, PanelLegend, Steps, Theme, panels};
 use antumbra_render::{KeptTree, Options, Sight, World, render, training_rays};
 use antumbra_scene::Scene;
 use rayon::prelude::*;
@@ -35,8 +36,6 @@ const STEP: f64 = 0.25;
 /// Rays of each kind, and turns, by which the trees are timed.
 const RAYS: usize = 100_000;
 const TURNS: usize = 15;
-/// Columns between the pictures.
-const GAP: usize = 6;
 
 /// Figures, as JSON.
 #[derive(Serialize)]
@@ -202,19 +201,48 @@ fn write_pictures(
     let window = Window::full(width, height);
     let sky = Image::new(width, height, window, open)?.to_srgb8();
     let hours = places.picture(|place| hours[place], f64::NAN);
-    let draw = |legend: bool| {
-        let range = heatmap::Range::Fixed {
+    let steps = Steps::between(0.0, longest, false);
+    let options = heatmap::Options {
+        range: heatmap::Range::Fixed {
             min: 0.0,
             max: longest as f32,
-        };
-        let mut options = heatmap::Options::default();
-        (options.range, options.legend) = (range, legend);
-        heatmap::render(&hours, width, height, &options)
+        },
+        legend: false,
     };
-    beside(&[light, &sky, &draw(false)?])?.write(out.join("city.png"))?;
+    let drawn = heatmap::render(&hours, width, height, &options)?;
+    let panel = |title, subtitle, image| Panel {
+        image,
+        title,
+        subtitle,
+        legend: None,
+    };
+    let sun = Panel {
+        legend: Some(PanelLegend {
+            quantity: "Direct sun",
+            unit: "h",
+            steps: &steps,
+            values: &hours,
+        }),
+        ..panel("By the sun", "21 June at 48.2° N, 16.4° E", &drawn)
+    };
+    let all = [
+        panel("In sunlight", "path traced", light),
+        panel(
+            "By the sky",
+            "white sees all of the sky, black nothing",
+            &sky,
+        ),
+        sun,
+    ];
+    let write = |name: &str, parts: &[Panel<'_>]| {
+        let drawing = panels(parts, Theme::Light).map_err(Failure::work)?;
+        let picture = drawing.pixels().map_err(Failure::work)?;
+        picture.write(out.join(name)).map_err(Failure::from)
+    };
+    write("city.png", &all)?;
     light.write(out.join("city-sunlight.png"))?;
     sky.write(out.join("city-ambient-occlusion.png"))?;
-    draw(true)?.write(out.join("city-sun-hours.png"))?;
+    write("city-sun-hours.png", &[sun])?;
     Ok(())
 }
 
@@ -303,23 +331,6 @@ impl Places {
     }
 }
 
-/// Pictures of one height beside each other.
-fn beside(pictures: &[&Rgb8Image]) -> Result<Rgb8Image, Failure> {
-    let height = pictures.first().map_or(0, |picture| picture.height());
-    let mut pixels = Vec::new();
-    for y in 0..height {
-        for (place, picture) in pictures.iter().enumerate() {
-            if place > 0 {
-                pixels.extend([[255; 3]; GAP]);
-            }
-            let width = picture.width();
-            pixels.extend_from_slice(&picture.pixels()[y * width..(y + 1) * width]);
-        }
-    }
-    let width = pixels.len() / height.max(1);
-    Ok(Rgb8Image::new(width, height, pixels)?)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -337,14 +348,5 @@ mod tests {
         );
         assert!(last[0] < -0.5 && last[1] > 0.3, "{last:?}");
         assert!(suns.iter().all(|sun| sun[2] > 0.0));
-    }
-
-    #[test]
-    fn pictures_stand_beside_each_other() {
-        let one = Rgb8Image::new(1, 2, vec![[1; 3], [2; 3]]).expect("a picture");
-        let both = beside(&[&one, &one]).expect("a picture");
-        assert_eq!((both.width(), both.height()), (2 + GAP, 2));
-        assert_eq!(both.pixels()[0], [1; 3]);
-        assert_eq!(both.pixels()[both.pixels().len() - 1], [2; 3]);
     }
 }

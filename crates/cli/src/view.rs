@@ -53,7 +53,7 @@ fn ready(
 ) -> Result<(Scene, World, Option<SunDay>), Failure> {
     let mut loaded = scenes::load_one(&args.scene, &args.picture, memory)?;
     scenes::apply_camera(&mut loaded, &args.camera)?;
-    let day = args.sun.map(|date| sun_day(args, &date, loaded.up.axis));
+    let day = args.day.map(|date| sun_day(args, &date, loaded.up.axis));
     let day = day.transpose()?;
     let scene = loaded.scene;
     server.tell("building the first tree");

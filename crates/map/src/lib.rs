@@ -36,6 +36,8 @@
 //! # Files
 //!
 //! - `map.rs`: [`Map`]: what is drawn; `layout.rs`: where
+//! - `panels.rs`: [`panels`], pictures beside each other
+//! - `sheet.rs`, `legend.rs`: what both are made of
 //! - `steps.rs`: [`Steps`], the rounded numbers of legends
 //! - `relief.rs`: [`Relief`], the model beneath the values
 //! - `theme.rs`: [`Theme`], colours of paper and text
@@ -49,10 +51,13 @@ mod drawing;
 mod error;
 mod font;
 mod layout;
+mod legend;
 mod map;
+mod panels;
 mod pdf;
 mod pixels;
 mod relief;
+mod sheet;
 mod steps;
 mod svg;
 mod theme;
@@ -61,6 +66,7 @@ pub use drawing::Drawing;
 pub use error::Error;
 pub use font::check as check_text;
 pub use map::Map;
+pub use panels::{Panel, PanelLegend, panels};
 pub use relief::Relief;
 pub use steps::Steps;
 pub use theme::Theme;

@@ -2,20 +2,20 @@
 
 use antumbra_image::{Rgb8Image, palette};
 
-use crate::drawing::{Anchor, Colour, Drawing, Item, Text, Weight, rectangle};
+use crate::drawing::{Anchor, Drawing, Item, Weight, rectangle};
 use crate::layout::Layout;
+use crate::legend::{Direction, Legend};
 use crate::relief::Shade;
+use crate::sheet::Sheet;
 use crate::steps::below;
 use crate::{Error, Relief, Steps, Theme, font};
 
 /// Least width and height of a map.
 pub(crate) const LEAST: u32 = 320;
 /// Most pixels of a map.
-const MOST: u64 = 100_000_000;
+pub(crate) const MOST: u64 = 100_000_000;
 /// Pixels of the picture inside for each pixel of the map, in both directions. Edges are smooth, and print is sharp.
 const FINE: u32 = 2;
-/// Colours in the bar of the legend.
-const COLOURS: usize = 256;
 
 /// A map: values in square cells as they are seen from above, with the model's north at the top.
 #[derive(Clone, Debug)]
@@ -97,26 +97,18 @@ impl Map<'_> {
         if let Some(relief) = &self.relief {
             relief.check()?;
         }
-        let mut sheet = Sheet {
+        let mut parts = Parts {
             map: self,
             layout: &layout,
-            items: Vec::new(),
+            sheet: Sheet::new(size, layout.em, self.theme),
         };
-        let [width, height] = size;
-        let paper = rectangle([0.0; 2], [width as f32, height as f32]);
-        sheet.fill(paper, self.theme.paper());
-        sheet.head();
-        sheet.map()?;
-        sheet.legend()?;
-        sheet.scale_bar();
-        sheet.north_arrow();
-        sheet.source();
-        Ok(Drawing {
-            width,
-            height,
-            title: font::shown(self.title),
-            items: sheet.items,
-        })
+        parts.head();
+        parts.map()?;
+        parts.legend()?;
+        parts.scale_bar();
+        parts.north_arrow();
+        parts.source();
+        Ok(parts.sheet.drawing(size, self.title))
     }
 
     /// Lines of a world file, which tells GIS programs where the pixels of a PNG of this size are.
@@ -187,15 +179,6 @@ impl Map<'_> {
         }
         Self::check_size(size)?;
         Ok(Layout::new(size, self.aspect()))
-    }
-
-    /// Whether values lie below and above the legend.
-    fn beyond(&self) -> [bool; 2] {
-        let Steps { low, high, .. } = self.steps;
-        // Values of single precision may round beyond an end that they equal.
-        let slack = 1e-6 * (high - low);
-        let any = |beyond: &dyn Fn(f64) -> bool| self.values.iter().any(|&x| beyond(f64::from(x)));
-        [any(&|x| x < low - slack), any(&|x| x > high + slack)]
     }
 
     /// The picture inside: values in colours over the relief.
@@ -274,40 +257,14 @@ impl<'a> Means<'a> {
     }
 }
 
-/// A drawing that is being made.
-struct Sheet<'a> {
+/// A map that is being drawn.
+struct Parts<'a> {
     map: &'a Map<'a>,
     layout: &'a Layout,
-    items: Vec<Item>,
+    sheet: Sheet,
 }
 
-impl Sheet<'_> {
-    fn fill(&mut self, corners: Vec<[f32; 2]>, fill: Colour) {
-        self.items.push(Item::Polygon { corners, fill });
-    }
-
-    fn outline(&mut self, corners: Vec<[f32; 2]>) {
-        self.items.push(Item::Outline {
-            corners,
-            colour: self.map.theme.soft(),
-            width: (0.06 * self.layout.em).max(0.75),
-        });
-    }
-
-    /// Adds a line of text. `size` is in the unit of the layout.
-    fn text(&mut self, text: &str, at: [f32; 2], size: f32, weight: Weight, anchor: Anchor) {
-        let is_soft = size < 0.9;
-        let theme = self.map.theme;
-        self.items.push(Item::Text(Text {
-            text: font::shown(text),
-            at,
-            size: size * self.layout.em,
-            weight,
-            anchor,
-            colour: if is_soft { theme.soft() } else { theme.text() },
-        }));
-    }
-
+impl Parts<'_> {
     fn head(&mut self) {
         let Layout {
             em, left, right, ..
@@ -315,7 +272,7 @@ impl Sheet<'_> {
         let room = right - left;
         let title = font::cut(self.map.title, Layout::TITLE * em, Weight::Bold, room);
         let base = self.layout.title_base;
-        self.text(
+        self.sheet.text(
             &title,
             [left, base],
             Layout::TITLE,
@@ -324,7 +281,8 @@ impl Sheet<'_> {
         );
         let line = font::cut(self.map.subtitle, em, Weight::Regular, room);
         let base = self.layout.subtitle_base;
-        self.text(&line, [left, base], 1.0, Weight::Regular, Anchor::Start);
+        self.sheet
+            .text(&line, [left, base], 1.0, Weight::Regular, Anchor::Start);
     }
 
     fn map(&mut self) -> Result<(), Error> {
@@ -336,83 +294,25 @@ impl Sheet<'_> {
         let image = self
             .map
             .picture(size.map(|side| (side * FINE as f32) as usize))?;
-        self.items.push(Item::Picture { image, at, size });
-        self.outline(rectangle(at, size));
+        self.sheet.items.push(Item::Picture { image, at, size });
+        self.sheet.outline(rectangle(at, size));
         Ok(())
     }
 
     fn legend(&mut self) -> Result<(), Error> {
-        let em = self.layout.em;
-        let is_upright = self.layout.is_upright;
-        let [x, y] = self.layout.legend_at;
-        let name = match self.map.unit {
-            "" => self.map.quantity.to_owned(),
-            unit => format!("{} in {unit}", self.map.quantity),
+        let legend = Legend {
+            quantity: self.map.quantity,
+            unit: self.map.unit,
+            steps: &self.map.steps,
+            beyond: self.map.steps.beyond(self.map.values),
         };
-        let room = self.layout.legend_room;
-        let lines = font::lines(&name, em, Weight::Bold, room);
-        for (index, line) in lines.iter().enumerate() {
-            let base = y + em * (0.95 + 1.25 * index as f32);
-            self.text(line, [x, base], 1.0, Weight::Bold, Anchor::Start);
-        }
-        let below_name = y + em * (1.25 * lines.len() as f32 + 0.35);
-        let thick = 1.3 * em;
-        let tip = 0.9 * em;
-        // Room for both tips, whether there are any or not.
-        let (at, size) = match is_upright {
-            true => (
-                [x, below_name + tip],
-                [thick, self.layout.legend_length - 2.0 * tip],
-            ),
-            false => (
-                [x + tip, below_name],
-                [self.layout.legend_length - 2.0 * tip, thick],
-            ),
+        let layout = self.layout;
+        let direction = match layout.is_upright {
+            true => Direction::Upright,
+            false => Direction::Across,
         };
-        let colour = |i: usize| palette::colour(i as f32 / (COLOURS - 1) as f32);
-        let image = match is_upright {
-            true => Rgb8Image::new(1, COLOURS, (0..COLOURS).rev().map(colour).collect())?,
-            false => Rgb8Image::new(COLOURS, 1, (0..COLOURS).map(colour).collect())?,
-        };
-        self.items.push(Item::Picture { image, at, size });
-        self.outline(rectangle(at, size));
-        let [below, above] = self.map.beyond();
-        let ([x0, y0], [x1, y1]) = (at, [at[0] + size[0], at[1] + size[1]]);
-        let tips = match is_upright {
-            true => [
-                [[x0, y1], [x1, y1], [(x0 + x1) / 2.0, y1 + tip]],
-                [[x0, y0], [x1, y0], [(x0 + x1) / 2.0, y0 - tip]],
-            ],
-            false => [
-                [[x0, y0], [x0, y1], [x0 - tip, (y0 + y1) / 2.0]],
-                [[x1, y0], [x1, y1], [x1 + tip, (y0 + y1) / 2.0]],
-            ],
-        };
-        for ((tip, is_drawn), end) in tips.into_iter().zip([below, above]).zip([0.0, 1.0]) {
-            if is_drawn {
-                self.fill(tip.to_vec(), palette::colour(end));
-                self.outline(tip.to_vec());
-            }
-        }
-        let tick = 0.3 * em;
-        let line = (0.08 * em).max(1.0);
-        for &mark in &self.map.steps.marks {
-            let place = self.map.steps.place(mark) as f32;
-            let label = self.map.steps.label(mark);
-            let text = self.map.theme.text();
-            if is_upright {
-                let y = y1 - place * size[1];
-                self.fill(rectangle([x1, y - line / 2.0], [tick, line]), text);
-                let at = [x1 + tick + 0.3 * em, y + 0.36 * em];
-                self.text(&label, at, 0.95, Weight::Regular, Anchor::Start);
-            } else {
-                let x = x0 + place * size[0];
-                self.fill(rectangle([x - line / 2.0, y1], [line, tick]), text);
-                let at = [x, y1 + tick + 1.05 * em];
-                self.text(&label, at, 0.95, Weight::Regular, Anchor::Middle);
-            }
-        }
-        Ok(())
+        let room = [layout.legend_length, layout.legend_room];
+        legend.draw(&mut self.sheet, layout.legend_at, room, direction)
     }
 
     /// Bar of a round length, about a third as long as the room for it at least.
@@ -434,19 +334,21 @@ impl Sheet<'_> {
         let high = (0.34 * em).max(2.0);
         let (text, paper) = (self.map.theme.text(), self.map.theme.paper());
         let half = wide / 2.0;
-        self.fill(rectangle([x, y], [half, high]), text);
-        self.fill(rectangle([x + half, y], [half, high]), paper);
-        self.outline(rectangle([x, y], [wide, high]));
+        self.sheet.fill(rectangle([x, y], [half, high]), text);
+        self.sheet
+            .fill(rectangle([x + half, y], [half, high]), paper);
+        self.sheet.outline(rectangle([x, y], [wide, high]));
         let number = (number * 1e9).round() / 1e9;
         let base = y + high + 1.1 * em;
         let label = format!("{number} {unit}");
-        self.text("0", [x, base], 0.95, Weight::Regular, Anchor::Start);
+        self.sheet
+            .text("0", [x, base], 0.95, Weight::Regular, Anchor::Start);
         let end = [x + wide, base];
         let anchor = match wide > font::width(&label, em, Weight::Regular) + em {
             true => Anchor::End,
             false => Anchor::Start,
         };
-        self.text(&label, end, 0.95, Weight::Regular, anchor);
+        self.sheet.text(&label, end, 0.95, Weight::Regular, anchor);
     }
 
     fn north_arrow(&mut self) {
@@ -463,10 +365,11 @@ impl Sheet<'_> {
         };
         let (tip, notch) = (at(0.0, 0.75), at(0.0, -0.9));
         let text = self.map.theme.text();
-        self.fill(vec![tip, notch, at(-0.62, -1.4)], text);
-        self.outline(vec![tip, at(0.62, -1.4), notch]);
+        self.sheet.fill(vec![tip, notch, at(-0.62, -1.4)], text);
+        self.sheet.outline(vec![tip, at(0.62, -1.4), notch]);
         let [x, y] = at(0.0, 1.35);
-        self.text("N", [x, y + 0.36 * em], 1.0, Weight::Bold, Anchor::Middle);
+        self.sheet
+            .text("N", [x, y + 0.36 * em], 1.0, Weight::Bold, Anchor::Middle);
     }
 
     fn source(&mut self) {
@@ -476,7 +379,8 @@ impl Sheet<'_> {
         let size = Layout::SOURCE;
         let line = font::cut(self.map.source, size * em, Weight::Regular, right - left);
         let base = self.layout.source_base;
-        self.text(&line, [left, base], size, Weight::Regular, Anchor::Start);
+        self.sheet
+            .text(&line, [left, base], size, Weight::Regular, Anchor::Start);
     }
 }
 
@@ -522,13 +426,5 @@ mod tests {
         let map = self::map(&holes, 4);
         assert_eq!(Means::new(&map, [2, 2]).at(0, 0), (1.0 + 4.0 + 5.0) / 3.0);
         assert!(Means::new(&map, [4, 4]).at(0, 0).is_nan());
-    }
-
-    #[test]
-    fn values_beyond_the_legend_are_seen() {
-        assert_eq!(map(&[0.0, 1.0], 2).beyond(), [false; 2]);
-        assert_eq!(map(&[-0.1, 1.0], 2).beyond(), [true, false]);
-        assert_eq!(map(&[f32::NAN, 1.5], 2).beyond(), [false, true]);
-        assert_eq!(map(&[f32::NEG_INFINITY], 1).beyond(), [true, false]);
     }
 }

@@ -64,6 +64,17 @@ impl Steps {
         }
     }
 
+    /// Whether some of these values lie below and above the legend. NaN does not.
+    pub fn beyond(&self, values: &[f32]) -> [bool; 2] {
+        // Values of single precision may round beyond an end that they equal.
+        let slack = 1e-6 * (self.high - self.low);
+        let any = |beyond: &dyn Fn(f64) -> bool| values.iter().any(|&x| beyond(f64::from(x)));
+        [
+            any(&|x| x < self.low - slack),
+            any(&|x| x > self.high + slack),
+        ]
+    }
+
     /// Place of a value on the legend: 0 at the dark end, 1 at the light one.
     pub fn place(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
@@ -150,6 +161,15 @@ mod tests {
             let steps = Steps::around(values, false);
             assert_eq!((steps.low, steps.high), (low, high), "{values:?}");
         }
+    }
+
+    #[test]
+    fn values_beyond_the_legend_are_seen() {
+        let steps = Steps::between(0.0, 1.0, false);
+        assert_eq!(steps.beyond(&[0.0, 1.0]), [false; 2]);
+        assert_eq!(steps.beyond(&[-0.1, 1.0]), [true, false]);
+        assert_eq!(steps.beyond(&[f32::NAN, 1.5]), [false, true]);
+        assert_eq!(steps.beyond(&[f32::NEG_INFINITY]), [true, false]);
     }
 
     #[test]

@@ -16,6 +16,7 @@ use std::thread;
 use std::time::Duration;
 
 use antumbra_image::{Rgb8Image, heatmap, palette};
+use antumbra_map::{Panel, PanelLegend, Steps, Theme, panels};
 use antumbra_render::{Options, Seen, World};
 use antumbra_scene::Scene;
 use serde::Serialize;
@@ -324,16 +325,28 @@ impl Door {
 
     /// Sends the picture as a file.
     fn save(&self, out: &mut impl Write, extension: &str, exposure: f32) -> io::Result<()> {
-        let (frame, title, samples) = {
+        let (frame, title, samples, sun) = {
             let state = self.shared.lock();
             let status = &state.status;
-            (state.full.clone(), status.title.clone(), status.samples)
+            let day = state.probe.as_ref().map(|probe| Arc::clone(&probe.day));
+            let sun = day.map(|day| (day, status.hour));
+            (
+                state.full.clone(),
+                status.title.clone(),
+                status.samples,
+                sun,
+            )
         };
         let Some(frame) = frame else {
             let reason = "there is no picture in full size yet";
             return plain(out, "503 Service Unavailable", reason);
         };
-        match encoded(&frame, extension, exposure) {
+        let is_sun = frame.mode.is_sun() && extension == "png";
+        let encoded = match sun.filter(|_| is_sun) {
+            Some((day, hour)) => captioned(&frame, &day, hour),
+            None => encoded(&frame, extension, exposure),
+        };
+        match encoded {
             Ok(bytes) => {
                 let kind = match extension {
                     "png" => "image/png",
@@ -344,7 +357,11 @@ impl Door {
                     .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
                     .collect();
                 // A picture under way is not taken for the finished one.
-                let name = format!("{name}-{samples}spp.{extension}");
+                let name = match frame.mode {
+                    Mode::Hours => format!("{name}-sun-hours.{extension}"),
+                    Mode::Shadows => format!("{name}-shadows.{extension}"),
+                    _ => format!("{name}-{samples}spp.{extension}"),
+                };
                 let more = format!("Content-Disposition: attachment; filename=\"{name}\"\r\n");
                 answer(out, "200 OK", kind, &more, &bytes)
             }
@@ -398,6 +415,33 @@ fn encoded(frame: &Frame, extension: &str, exposure: f32) -> Result<Vec<u8>, Str
         image.write(&path).map_err(words)?;
     }
     std::fs::read(&path).map_err(|error| error.to_string())
+}
+
+/// A picture of the sun of a day with its words, and the legend of hours, as PNG.
+fn captioned(frame: &Frame, day: &SunDay, hour: f64) -> Result<Vec<u8>, String> {
+    let image = frame.tiles.image().map_err(|error| error.to_string())?;
+    let minutes = (60.0 * hour).round() as u32;
+    let title = match frame.mode {
+        Mode::Hours => "Hours of direct sun".to_owned(),
+        _ => format!("Shadows at {:02}:{:02}", minutes / 60, minutes % 60),
+    };
+    let steps = Steps::between(0.0, f64::from(day.longest()), false);
+    let legend = PanelLegend {
+        quantity: "Direct sun",
+        unit: "h",
+        steps: &steps,
+        // No hours are beyond the longest ones.
+        values: &[],
+    };
+    let panel = Panel {
+        image: &image.to_srgb8(),
+        title: &title,
+        subtitle: &day.caption,
+        legend: (frame.mode == Mode::Hours).then_some(legend),
+    };
+    let drawing = panels(&[panel], Theme::Light).map_err(|error| error.to_string())?;
+    let pixels = drawing.pixels().map_err(|error| error.to_string())?;
+    pixels.to_png().map_err(|error| error.to_string())
 }
 
 /// A map of tests with its legend.

@@ -21,18 +21,18 @@ pub struct ViewArgs {
     /// The page paints hours of direct sun on the model, shows its shadows at a time that a slider sets, and draws the hours of
     /// points that are clicked. Needs --lat and --lon.
     #[arg(long, value_name = "DATE", requires = "lat", requires = "lon", help_heading = heading::SUN)]
-    pub sun: Option<Moment>,
+    pub day: Option<Moment>,
     /// Latitude in degrees, south negative
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, requires = "sun", help_heading = heading::SUN)]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, requires = "day", help_heading = heading::SUN)]
     pub lat: Option<f64>,
     /// Longitude in degrees, west negative
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, requires = "sun", help_heading = heading::SUN)]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, requires = "day", help_heading = heading::SUN)]
     pub lon: Option<f64>,
     /// Hours ahead of UTC [default: by the longitude]
-    #[arg(long, value_name = "HOURS", allow_negative_numbers = true, requires = "sun", help_heading = heading::SUN)]
+    #[arg(long, value_name = "HOURS", allow_negative_numbers = true, requires = "day", help_heading = heading::SUN)]
     pub timezone: Option<f64>,
     /// Angle from mesh north to true north, clockwise
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, requires = "sun", help_heading = heading::SUN)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, requires = "day", help_heading = heading::SUN)]
     pub north: f64,
     #[command(flatten)]
     pub picture: PictureArgs,

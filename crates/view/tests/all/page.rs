@@ -12,7 +12,7 @@ use antumbra_view::Server;
 use crate::support::{options, scene};
 
 /// Port and secret path of an address.
-fn parts(address: &str) -> (u16, String) {
+pub fn parts(address: &str) -> (u16, String) {
     let rest = address.strip_prefix("http://127.0.0.1:").expect("loopback");
     let (port, path) = rest.split_once('/').expect("a path");
     (port.parse().expect("a port"), format!("/{path}"))
@@ -26,7 +26,13 @@ fn connect(port: u16) -> TcpStream {
 }
 
 /// Status line, headers and body of the answer to one request.
-fn ask(port: u16, method: &str, path: &str, host: &str, body: &str) -> (String, String, Vec<u8>) {
+pub fn ask(
+    port: u16,
+    method: &str,
+    path: &str,
+    host: &str,
+    body: &str,
+) -> (String, String, Vec<u8>) {
     let mut stream = connect(port);
     let length = body.len();
     write!(
@@ -51,16 +57,16 @@ fn ask(port: u16, method: &str, path: &str, host: &str, body: &str) -> (String, 
 type Message = (u8, Vec<u8>);
 
 /// The stream of one page.
-struct Viewer {
+pub struct Viewer {
     stream: TcpStream,
-    status: serde_json::Value,
+    pub status: serde_json::Value,
     /// Numbers of the last frame.
     frame: Vec<i32>,
     tiles: usize,
 }
 
 impl Viewer {
-    fn open(port: u16, path: &str) -> Self {
+    pub fn open(port: u16, path: &str) -> Self {
         let mut stream = connect(port);
         write!(
             stream,
@@ -102,7 +108,7 @@ impl Viewer {
     }
 
     /// Reads until the status says so.
-    fn until(&mut self, holds: impl Fn(&serde_json::Value) -> bool) {
+    pub fn until(&mut self, holds: impl Fn(&serde_json::Value) -> bool) {
         while !holds(&self.status) {
             self.next().expect("the stream goes on");
         }
