@@ -7,7 +7,8 @@
 //! - `methods`: the class `Queries`, which has what follows;  `scenes`: the class `Scene`;  `world`: the class `World`
 //! - `rays`: rays of a call, in pieces;  `queries`: what they hit;  `hits`: the results;  `points`: questions about points
 //! - `distinct`: hits as trimesh tells them;  `memory`: lists that may not fit
-//! - `bake`: ambient occlusion, sky, sun, visibility between points;  `bits`: the class `BitMatrix`;  `picture`: the class `Picture`
+//! - `bake`: ambient occlusion, sky, sun, visibility between points;  `bits`: the class `BitMatrix`;  `picture`: the class `Picture`;  `map`: the
+//!   class `Map`
 //! - `html`: what notebooks show
 //! - `file`: scenes from files;  `saved`: scenes in files and pickles
 //! - `threads`: pools of threads, and `fork`;  `watch`: Ctrl-C and progress
@@ -21,6 +22,7 @@ mod file;
 mod geometry;
 mod hits;
 mod html;
+mod map;
 mod memory;
 mod meshes;
 mod methods;
@@ -56,6 +58,8 @@ mod _core {
     use super::bits::BitMatrix;
     #[pymodule_export]
     use super::hits::{HitList, Hits};
+    #[pymodule_export]
+    use super::map::Map;
     #[pymodule_export]
     use super::methods::Queries;
     #[pymodule_export]

@@ -13,7 +13,7 @@ PAGE = pathlib.Path(__file__).parents[3] / "docs" / "python" / "reference.md"
 
 PARTS = [
     ("Scenes", antumbra, ["Scene", "World", "Queries", "Mesh", "Instance"]),
-    ("Results", antumbra, ["Hits", "HitList", "Closest", "Occluders", "BitMatrix", "SunPositions", "Irradiation", "Picture"]),
+    ("Results", antumbra, ["Hits", "HitList", "Closest", "Occluders", "BitMatrix", "SunPositions", "Irradiation", "Map", "Picture"]),
     ("Functions", antumbra, ["sun_positions", "irradiation", "sky_patches", "texel_atlas", "heat_map", "render", "set_threads", "get_threads"]),
     ("Warnings", antumbra, ["DegenerateWarning"]),
     ("antumbra.trimesh", antumbra.trimesh, ["RayMeshIntersector", "install"]),

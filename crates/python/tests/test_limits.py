@@ -72,6 +72,7 @@ for name, call in {
     "instances": lambda: am.Scene([(many, faces)], instances=[(0, np.eye(4))]),
     "texel_atlas": lambda: am.texel_atlas(many, faces, np.broadcast_to(np.zeros(2), (10**12, 2)), 4),
     "heat_map": lambda: am.heat_map(flat),
+    "map": lambda: am.Map(flat, 1.0),
     "picture": lambda: am.Picture(np.broadcast_to(np.zeros(3), (10**6, 10**6, 3))),
     "words": lambda: am.BitMatrix(words, 64),
     "count_of_columns": lambda: am.BitMatrix(np.zeros((0, 10**12 // 64), np.uint64), 10**12).count(0),

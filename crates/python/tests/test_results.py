@@ -255,3 +255,45 @@ def test_large_answers_need_no_copy():
     origins = RNG.uniform(-1.5, 1.5, (300_000, 3)).astype(np.float32)
     SCENE.occluded(origins, [0, 0, 1], out=out, threads=2)
     np.testing.assert_array_equal(out, SCENE.occluded(origins, [0, 0, 1]))
+
+
+def test_a_map_is_written_in_three_formats_and_drawn_by_matplotlib(tmp_path):
+    values = np.linspace(0, 12, 600).reshape(20, 30)
+    values[3, 4] = np.nan
+    heights = np.zeros((40, 60))
+    heights[10:20, 10:30] = 9.0
+    found = am.Map(values, 2.0, title="A court & a wall", quantity="Direct sun", unit="h", range=(0, 8), heights=heights, size=(640, 480))
+    assert found.size == (640, 480) and found.range == (0, 8)
+    for name, start in (("map.png", b"\x89PNG"), ("map.svg", b"<svg "), ("map.pdf", b"%PDF-")):
+        found.save(tmp_path / name)
+        assert (tmp_path / name).read_bytes().startswith(start)
+    svg = (tmp_path / "map.svg").read_text(encoding="utf-8")
+    assert "A court &amp; a wall" in svg and "Direct sun in h" in svg and "#fde725" in svg
+    assert found._repr_png_() == (tmp_path / "map.png").read_bytes()
+    assert am.Map(values, 2.0).range == (0, 12)
+    with pytest.raises(ValueError, match="png, .svg or .pdf"):
+        found.save(tmp_path / "map.xyz")
+    for bad in (
+        dict(values=values[0]),
+        dict(cell=0),
+        dict(range=(1, 1)),
+        dict(size=(10, 10)),
+        dict(metres=0),
+        dict(north=np.nan),
+        dict(heights=heights[:39]),
+    ):
+        with pytest.raises(ValueError):
+            am.Map(**{"values": values, "cell": 2.0, **bad})
+
+
+def test_a_map_by_matplotlib_has_the_range_of_the_drawing():
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    found = am.Map([[0.0, 5.0], [9.0, np.nan]], 10.0, title="Court", quantity="Direct sun", unit="h", range=(0, 8))
+    axes = found.plot()
+    (image,) = axes.get_images()
+    assert image.get_clim() == (0, 8) and image.get_cmap().name == "viridis"
+    assert list(image.get_extent()) == [0, 20, 0, 20]
+    assert image.get_array().shape == (2, 2) and axes.get_title() == "Court"
+    assert image.colorbar.extend == "max" and image.colorbar.ax.get_ylabel() == "Direct sun in h"
+    assert found.plot(ax=axes) is axes

@@ -34,6 +34,7 @@ __all__ = [
     "DegenerateWarning",
     "HitList",
     "Hits",
+    "Map",
     "Picture",
     "Queries",
     "Scene",
@@ -485,6 +486,33 @@ class BitMatrix:
     def __len__(self) -> int: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __reduce__(self) -> tuple[type[BitMatrix], tuple[Any, ...]]: ...
+
+@final
+class Map:
+    def __new__(
+        cls,
+        values: ArrayLike,
+        cell: float,
+        *,
+        title: str = "",
+        subtitle: str = "",
+        quantity: str = "",
+        unit: str = "",
+        range: tuple[float, float] | None = None,
+        metres: float | None = 1.0,
+        north: float = 0.0,
+        heights: ArrayLike | None = None,
+        source: str = "",
+        size: tuple[int, int] | None = None,
+        dark: bool = False,
+    ) -> Map: ...
+    @property
+    def size(self) -> tuple[int, int]: ...
+    @property
+    def range(self) -> tuple[float, float]: ...
+    def save(self, path: str | os.PathLike[str]) -> None: ...
+    def plot(self, ax: Any = None) -> Any: ...
+    def _repr_png_(self) -> bytes: ...
 
 @final
 class Picture:
