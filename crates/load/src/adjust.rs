@@ -26,7 +26,7 @@ impl IntegratorKind {
     /// The kind of a scene's integrator.
     pub fn of(integrator: &Integrator) -> Self {
         match integrator {
-            Integrator::Path { .. } => Self::Path,
+            Integrator::Path { .. } | Integrator::VolumePath { .. } => Self::Path,
             Integrator::DirectLighting { .. } => Self::DirectLighting,
             Integrator::AmbientOcclusion { .. } => Self::AmbientOcclusion,
         }
@@ -90,12 +90,10 @@ pub fn set_ambient(
             *open = new_open.unwrap_or(*open);
             Ok(())
         }
-        Integrator::Path { .. } | Integrator::DirectLighting { .. } if new_distance.is_some() => {
-            Err(Error::NoDistance {
-                scene: scene.name.clone(),
-            })
-        }
-        Integrator::Path { .. } | Integrator::DirectLighting { .. } => Ok(()),
+        _ if new_distance.is_some() => Err(Error::NoDistance {
+            scene: scene.name.clone(),
+        }),
+        _ => Ok(()),
     }
 }
 
@@ -119,7 +117,7 @@ pub fn set_samples(scene: &mut Scene, number: u32) -> Result<(), Error> {
                 }
             }
         }
-        Integrator::Path { .. } => {
+        Integrator::Path { .. } | Integrator::VolumePath { .. } => {
             return Err(Error::NoSampleCount {
                 scene: scene.name.clone(),
             });
@@ -232,7 +230,9 @@ pub fn set_crop(scene: &mut Scene, crop: Crop) -> Result<(), Error> {
 /// [`Error::NoDepth`] for ambient occlusion.
 pub fn set_max_depth(scene: &mut Scene, depth: u32) -> Result<(), Error> {
     match &mut scene.integrator {
-        Integrator::Path { max_depth, .. } | Integrator::DirectLighting { max_depth, .. } => {
+        Integrator::Path { max_depth, .. }
+        | Integrator::VolumePath { max_depth, .. }
+        | Integrator::DirectLighting { max_depth, .. } => {
             *max_depth = depth;
             Ok(())
         }

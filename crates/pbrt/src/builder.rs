@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use antumbra_scene::{
-    Accelerator, Camera, Film, Filter, Geometry, Instance, Integrator, Light, Material, Object,
-    Sampler, Scene, Shape,
+    Accelerator, Camera, Film, Filter, Geometry, Instance, Integrator, Light, Material, Medium,
+    MediumInterface, Object, Sampler, Scene, Shape,
 };
 use glam::{Affine3, DMat4, DVec3, DVec4};
 
@@ -24,7 +24,8 @@ use crate::state::{BlockKind, State, Transforms};
 use crate::texture::{Images, TextureSpace, Textured};
 use crate::version4;
 use crate::{
-    Options, Times, camera, film, light, material, settings, shape, suggest, texture, transform,
+    Options, Times, camera, film, light, material, medium, settings, shape, suggest, texture,
+    transform,
 };
 
 /// Section of the file.
@@ -70,6 +71,9 @@ pub(crate) struct Builder<'o> {
     shapes: Vec<Shape>,
     materials: Vec<Material>,
     material_indices: HashMap<MaterialKey, usize>,
+    media: Vec<Medium>,
+    /// Current medium of each name.
+    media_indices: HashMap<String, u32>,
     lights: Vec<Light>,
     /// Textures whose images are not read yet. Images of consecutive textures are read together.
     pending_textures: Vec<texture::Declaration>,
@@ -111,6 +115,8 @@ impl<'o> Builder<'o> {
             shapes: Vec::new(),
             materials: Vec::new(),
             material_indices: HashMap::new(),
+            media: Vec::new(),
+            media_indices: HashMap::new(),
             lights: Vec::new(),
             pending_textures: Vec::new(),
             images: Images::default(),
@@ -145,6 +151,7 @@ impl<'o> Builder<'o> {
         for path in self.images.paths() {
             report.sources.note(path.clone());
         }
+        self.check_media(end, report);
         let meshes = self.pending_meshes;
         let times = Times {
             meshes: meshes.read(
@@ -163,6 +170,7 @@ impl<'o> Builder<'o> {
             objects: self.objects,
             instances: self.instances,
             materials: self.materials,
+            media: self.media,
             lights: self.lights,
             camera: self.camera,
             film: self.film,
@@ -172,6 +180,16 @@ impl<'o> Builder<'o> {
             origin: self.options.origin,
         };
         (scene, times)
+    }
+
+    /// Says where the integrator does not know media. They are left out then, as in pbrt-v3.
+    fn check_media(&self, end: Span, report: &mut Report) {
+        let mut shapes = self.shapes.iter();
+        let has_media = self.camera.medium.is_some() || shapes.any(|shape| shape.media.is_some());
+        if has_media && !matches!(self.integrator, Integrator::VolumePath { .. }) {
+            let message = "participating media are left out: only volpath, bdpt and mlt know them";
+            report.note(end, message);
+        }
     }
 
     /// Removes the shapes of objects without instances.
@@ -262,6 +280,10 @@ impl<'o> Builder<'o> {
     fn world_end(&mut self, report: &mut Report) {
         self.report_open_blocks(report);
         self.phase = Phase::Done;
+        if !self.is_version4 {
+            // As in pbrt-v3, where the camera is made when the world ends.
+            self.camera.medium = self.medium(1, report);
+        }
     }
 
     fn report_open_blocks(&mut self, report: &mut Report) {
@@ -407,6 +429,9 @@ impl<'o> Builder<'o> {
         let (camera, world_from_camera) =
             camera::declare(at, kind, params, (&transforms, origin), report);
         self.camera = camera;
+        if self.is_version4 {
+            self.camera.medium = self.medium(1, report);
+        }
         self.coordinate_systems
             .insert("camera".into(), [world_from_camera; 2]);
     }
@@ -474,6 +499,7 @@ impl<'o> Builder<'o> {
             Geometry::Mesh(mesh) => mesh.bytes(),
             Geometry::Sphere(_) => 0,
         };
+        let media = self.media(report);
         let bytes = size_of::<Shape>() as u64 + of_mesh;
         if !self.budget.take(bytes, at, report) {
             return;
@@ -482,6 +508,7 @@ impl<'o> Builder<'o> {
             geometry,
             material: self.material_index(material),
             area_light: area_light.filter(|_| !is_of_object),
+            media,
             alpha: cutouts.alpha,
             shadow_alpha: cutouts.shadow_alpha,
             reverse_orientation: self.state.now.reverse_orientation,
@@ -497,6 +524,48 @@ impl<'o> Builder<'o> {
             self.pending_meshes.push(object, shapes.len(), file);
         }
         shapes.push(shape);
+    }
+
+    fn named_medium(&mut self, at: Span, name: Quoted, params: &Params, report: &mut Report) {
+        let to_world = self.to_origin(self.state.now.transforms.start);
+        let Some(medium) = medium::declare(at, &name, params, &to_world, report) else {
+            // Uses of the name are no further mistakes.
+            self.media_indices.entry(name.text).or_insert(0);
+            return;
+        };
+        let cells = medium.density.as_ref().map_or(0, |grid| grid.values.len());
+        let bytes = size_of::<Medium>() as u64 + size_of::<f32>() as u64 * cells as u64;
+        if self.budget.take(bytes, at, report) {
+            self.media_indices
+                .insert(name.text, self.media.len() as u32);
+            self.media.push(medium);
+        }
+    }
+
+    /// Media on the two sides of a shape, if they differ.
+    fn media(&self, report: &mut Report) -> Option<MediumInterface> {
+        let [inside, outside] = [0, 1].map(|side| self.medium(side, report));
+        (inside != outside).then_some(MediumInterface { inside, outside })
+    }
+
+    /// Medium in force inside (0) or outside (1). An unknown name is vacuum.
+    fn medium(&self, side: usize, report: &mut Report) -> Option<u32> {
+        let name = self.state.now.media[side].as_ref()?;
+        let found = self.media_indices.get(&name.text).copied();
+        if found.is_none() {
+            report.tolerated(
+                name.span,
+                format!("no medium is named {:?}", name.text),
+                "vacuum is taken",
+                || {
+                    let mut known: Vec<&str> =
+                        self.media_indices.keys().map(String::as_str).collect();
+                    known.sort_unstable();
+                    suggest::help(&name.text, &known)
+                },
+            );
+        }
+        found
     }
 
     /// Index of a material in the scene. New materials are added.
@@ -597,11 +666,10 @@ impl Handler for Builder<'_> {
             D::ObjectBegin(name) => self.object_begin(at, name, report),
             D::ObjectEnd => self.end_block(BlockKind::Object, at, report),
             D::ObjectInstance(name) => self.object_instance(at, &name, report),
-            D::MakeNamedMedium => report.unsupported(at, "participating media are"),
+            D::MakeNamedMedium(name, params) => self.named_medium(at, name, &params, report),
             D::MediumInterface { inside, outside } => {
-                if !(inside.text.is_empty() && outside.text.is_empty()) {
-                    report.unsupported(at, "participating media are");
-                }
+                self.state.now.media =
+                    [inside, outside].map(|name| (!name.text.is_empty()).then(|| Arc::new(name)));
             }
             D::Texture {
                 name,

@@ -37,8 +37,7 @@ pub(crate) enum Directive {
     LightSource(Quoted, Params),
     LookAt([f64; 9]),
     MakeNamedMaterial(Quoted, Params),
-    /// Participating medium, which is refused in any case.
-    MakeNamedMedium,
+    MakeNamedMedium(Quoted, Params),
     Material(Quoted, Params),
     MediumInterface {
         inside: Quoted,
@@ -70,10 +69,6 @@ pub(crate) enum Directive {
     WorldBegin,
     WorldEnd,
 }
-
-/// Directives that are refused.
-#[cfg(test)]
-pub(crate) const UNSUPPORTED: &[&str] = &["MakeNamedMedium", "MediumInterface"];
 
 /// Receiver of directives.
 pub(crate) trait Handler {

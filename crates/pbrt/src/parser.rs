@@ -272,11 +272,7 @@ fn directive(
         "LightSource" => with_params!(LightSource),
         "LookAt" => Directive::LookAt(numbers(lexer, report, at)?),
         "MakeNamedMaterial" => with_params!(MakeNamedMaterial),
-        "MakeNamedMedium" => {
-            quoted(lexer, report, at)?;
-            params(lexer, report)?;
-            Directive::MakeNamedMedium
-        }
+        "MakeNamedMedium" => with_params!(MakeNamedMedium),
         "Material" => with_params!(Material),
         "MediumInterface" => {
             let inside = quoted(lexer, report, at)?;

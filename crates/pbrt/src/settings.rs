@@ -102,7 +102,7 @@ pub(crate) const INTEGRATORS: &[&str] = &[
     "whitted",
 ];
 
-/// Parameters of integrators that are taken as `path`, which change noise and time alone.
+/// Parameters of integrators that are taken as `path` or `volpath`, which change noise and time alone.
 const OF_OTHER_INTEGRATORS: &[(&str, &[ParamType])] = &[
     ("bootstrapsamples", &[ParamType::Integer]),
     ("chains", &[ParamType::Integer]),
@@ -127,15 +127,25 @@ pub(crate) fn declare_integrator(
 ) -> Integrator {
     let mut lookup = Lookup::new(at, format!("integrator {:?}", kind.text), params);
     lookup.unsupported("pixelbounds", &[ParamType::Integer], report);
-    if let "bdpt" | "mlt" | "sppm" | "volpath" = kind.text.as_str() {
+    let taken_as = match kind.text.as_str() {
+        "bdpt" | "mlt" => Some("volpath"),
+        "sppm" => Some("path"),
+        _ => None,
+    };
+    if let Some(taken_as) = taken_as {
         for (name, types) in OF_OTHER_INTEGRATORS {
             let _ = lookup.find(name, types);
         }
-        let message = format!("integrator {:?} is taken as \"path\"", kind.text);
+        let message = format!("integrator {:?} is taken as {taken_as:?}", kind.text);
         report.note(kind.span, message);
     }
     let integrator = match kind.text.as_str() {
-        "bdpt" | "mlt" | "path" | "sppm" | "volpath" => Integrator::Path {
+        "path" | "sppm" => Integrator::Path {
+            max_depth: lookup.integer_from("maxdepth", 5, 0, report),
+            rr_threshold: lookup.float("rrthreshold", 1.0, report),
+            light_strategy: light_strategy(&mut lookup, report),
+        },
+        "bdpt" | "mlt" | "volpath" => Integrator::VolumePath {
             max_depth: lookup.integer_from("maxdepth", 5, 0, report),
             rr_threshold: lookup.float("rrthreshold", 1.0, report),
             light_strategy: light_strategy(&mut lookup, report),

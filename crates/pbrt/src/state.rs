@@ -76,6 +76,8 @@ pub(crate) struct Attributes {
     /// Current material; `None` means the default, matte.
     pub material: Option<Arc<MaterialSpec>>,
     pub area_light: Option<AreaLight>,
+    /// Names of the media inside and outside of surfaces, of which an empty one is vacuum.
+    pub media: [Option<Arc<Quoted>>; 2],
     pub reverse_orientation: bool,
     /// Place of the `ObjectBegin` of the open object.
     pub object: Option<Span>,

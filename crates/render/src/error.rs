@@ -54,6 +54,22 @@ pub enum Error {
         /// Largest number of parts.
         limit: usize,
     },
+    /// A participating medium cannot be used.
+    #[error("medium {index} cannot be used: {reason}")]
+    Medium {
+        /// Index of the medium.
+        index: usize,
+        /// What is wrong.
+        reason: &'static str,
+    },
+    /// A shape or the camera names a medium that does not exist.
+    #[error("medium {index} is named, but the scene has {media}, counted from 0")]
+    NoMedium {
+        /// Index that is named.
+        index: u32,
+        /// Number of media.
+        media: usize,
+    },
     /// A table of scattering contradicts itself.
     #[error("the table {name:?} of a material cannot be used: {reason}")]
     Table {

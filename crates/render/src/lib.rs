@@ -25,6 +25,7 @@
 //! - `texture/`: textures and alpha masks
 //! - `light/`: lights, and the choice of one of them
 //! - `material/`: materials, and how they scatter light (`bsdf/`)
+//! - `medium/`: participating media: distances, directions, transmittance
 //! - `training/`: training rays, and the binary trees that learn from them
 //! - `world/`: a scene lowered for rendering: [`World`]
 //! - `integrator/`: radiance along batches of camera rays
@@ -43,6 +44,7 @@ mod integrator;
 mod light;
 mod live;
 mod material;
+mod medium;
 mod options;
 mod render;
 mod resume;

@@ -23,6 +23,8 @@ pub struct Camera {
     pub lens_radius: f32,
     /// Distance of the plane in focus along z, in scene units. Ignored for a pinhole.
     pub focal_distance: f32,
+    /// Index into [`Scene::media`](crate::Scene::media) of the medium around the camera. `None` is vacuum.
+    pub medium: Option<u32>,
 }
 
 impl Default for Camera {
@@ -34,6 +36,7 @@ impl Default for Camera {
             frame_aspect_ratio: None,
             lens_radius: 0.0,
             focal_distance: 1e6,
+            medium: None,
         }
     }
 }

@@ -104,6 +104,7 @@ impl Scene {
             objects: Vec::new(),
             instances: Vec::new(),
             materials: self.materials.clone(),
+            media: self.media.clone(),
             lights: self.lights.clone(),
             camera: self.camera.clone(),
             film: self.film.clone(),

@@ -14,6 +14,17 @@ pub enum Integrator {
         /// Distribution from which a vertex chooses a light.
         light_strategy: LightStrategy,
     },
+    /// Path tracing through participating media. Light passes surfaces without a material.
+    ///
+    /// Equal to [`Self::Path`] in scenes without media and without such surfaces.
+    VolumePath {
+        /// Largest number of scattering events of a path.
+        max_depth: u32,
+        /// Largest throughput component below which Russian roulette applies.
+        rr_threshold: f32,
+        /// Distribution from which a vertex chooses a light.
+        light_strategy: LightStrategy,
+    },
     /// Direct lighting plus perfectly specular chains.
     DirectLighting {
         /// Lights that are sampled at a point.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::{Param, Rgb, transform};
+use crate::{MediumInterface, Param, Rgb, transform};
 use glam::{DMat4, DVec3, Vec2, Vec3};
 use serde::Serialize;
 
@@ -15,6 +15,8 @@ pub struct Shape {
     pub material: usize,
     /// Emission of the surface; `None` if it is no light.
     pub area_light: Option<AreaLight>,
+    /// Media on the two sides of the surface. `None` if the medium is the same on both sides.
+    pub media: Option<MediumInterface>,
     /// Alpha mask: the surface is cut out where the value is exactly 0, as in pbrt-v3. `None` means 1 everywhere.
     pub alpha: Option<Param<f32>>,
     /// Alpha mask that only occlusion queries see, in addition to `alpha`.

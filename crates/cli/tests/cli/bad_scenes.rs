@@ -118,7 +118,7 @@ fn what_is_not_supported_can_be_left_out() {
     let scene = "Film \"image\" \"integer xresolution\" [8] \"integer yresolution\" [8]\n\
         Integrator \"bdpt\"\n\
         WorldBegin\n\
-        MediumInterface \"fog\" \"\"\n\
+        Shape \"cone\"\n\
         NamedMaterial \"nowhere\"\n\
         Shape \"sphere\"\n\
         WorldEnd\n";
@@ -126,10 +126,7 @@ fn what_is_not_supported_can_be_left_out() {
     let run = place
         .run(&["render", "fog.pbrt", "-o", "out.png"])
         .expect(65);
-    assert!(
-        run.stderr
-            .contains("fog.pbrt:4:1: error: participating media")
-    );
+    assert!(run.stderr.contains("fog.pbrt:4:7: error: shape \"cone\""));
     let args = [
         "render",
         "fog.pbrt",
@@ -141,8 +138,8 @@ fn what_is_not_supported_can_be_left_out() {
     ];
     let run = place.run(&args).expect(0);
     for said in [
-        "fog.pbrt:2:12: note: integrator \"bdpt\" is taken as \"path\"",
-        "fog.pbrt:4:1: warning: participating media are not supported yet, and left out",
+        "fog.pbrt:2:12: note: integrator \"bdpt\" is taken as \"volpath\"",
+        "fog.pbrt:4:7: warning: shape \"cone\" is not supported yet, and left out",
         "fog.pbrt:5:15: warning: no material is named \"nowhere\" here",
     ] {
         assert!(run.stderr.contains(said), "{said}\n{}", run.stderr);

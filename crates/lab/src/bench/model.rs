@@ -107,6 +107,7 @@ mod tests {
             }),
             material: 0,
             area_light: None,
+            media: None,
             alpha: None,
             shadow_alpha: None,
             reverse_orientation: false,

@@ -216,6 +216,7 @@ impl<'a> Reader<'a> {
                     geometry: Geometry::Mesh(Arc::new(mesh)),
                     material: look.material,
                     area_light: look.emission.clone(),
+                    media: None,
                     alpha,
                     shadow_alpha: None,
                     reverse_orientation: false,

@@ -154,6 +154,7 @@ fn parse_within(
             geometry: Geometry::Mesh(Arc::new(mesh)),
             material,
             area_light: looks.emission,
+            media: None,
             alpha,
             shadow_alpha: None,
             reverse_orientation: false,

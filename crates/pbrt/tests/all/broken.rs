@@ -122,7 +122,14 @@ WorldBegin WorldEnd"#, r#"16 numbers in [ ]"#),
         (r#"WorldBegin LightSource ›"sun" WorldEnd"#, r#"unknown light"#),
         (r#"WorldBegin AreaLightSource ›"dif" WorldEnd"#, r#"known: area, diffuse"#),
         (r#"WorldBegin CoordSysTransform ›"x" WorldEnd"#, r#"known: world"#),
-        (r#"WorldBegin ›MediumInterface "fog" WorldEnd"#, r#"participating media"#),
+        // Media.
+        (r#"WorldBegin ›MakeNamedMedium "m" WorldEnd"#, r#"needs a parameter "type""#),
+        (r#"WorldBegin MakeNamedMedium "m" "string type" ›"fog" WorldEnd"#, r#"known: heterogeneous, homogeneous"#),
+        (r#"WorldBegin ›MakeNamedMedium "m" "string type" "homogeneous" "float g" 1 WorldEnd"#, r#"between -1 and 1"#),
+        (r#"WorldBegin ›MakeNamedMedium "m" "string type" "heterogeneous" WorldEnd"#, r#"needs a parameter "density""#),
+        (r#"WorldBegin MakeNamedMedium "m" "string type" "heterogeneous" "integer nx" 2 "float density" ›[1] WorldEnd"#, r#"1 values of "density" for 2 x 1 x 1 cells"#),
+        (r#"WorldBegin MakeNamedMedium "m" "string type" "heterogeneous" "integer nx" 2 "float density" [1 ›-1] WorldEnd"#, r#"finite and not negative"#),
+        (r#"WorldBegin ›MakeNamedMedium "m" "string type" "heterogeneous" "float density" 1 "point p1" [1 0 1] WorldEnd"#, r#"box of the medium is empty"#),
         // Shapes.
         (r#"WorldBegin Shape ›"cone" WorldEnd"#, r#""cone" is not supported yet"#),
         (r#"WorldBegin Shape "plymesh" "string filename" [›"no.ply"] WorldEnd"#, r#"cannot read mesh "no.ply""#),
@@ -301,8 +308,8 @@ fn many_mistakes_are_counted_beyond_the_first_hundred() {
 
 #[test]
 fn repeated_features_are_reported_once() {
-    let media = "MediumInterface \"fog\" \"\"\n".repeat(50);
-    let text = format!("WorldBegin\n{media}WorldEnd");
+    let cones = "Shape \"cone\"\n".repeat(50);
+    let text = format!("WorldBegin\n{cones}WorldEnd");
     let diagnostics = complaints(load_text(&text));
     assert_eq!(diagnostics.len(), 1);
     assert!(diagnostics[0].message.ends_with("(and 49 more like it)"));

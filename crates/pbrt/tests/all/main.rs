@@ -7,6 +7,7 @@
 //! - `lights`: lights with images
 //! - `limits`: scenes that demand too much
 //! - `materials`, `textures`: materials, textures and alpha masks
+//! - `media`: participating media
 //! - `meshes`: meshes in separate files
 //! - `mutated`: damaged copies of valid files, which must not crash the reader
 //! - `shapes`: smooth shapes
@@ -19,6 +20,7 @@ mod instances;
 mod lights;
 mod limits;
 mod materials;
+mod media;
 mod meshes;
 mod mutated;
 mod shapes;

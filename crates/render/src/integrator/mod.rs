@@ -5,6 +5,7 @@
 //! the other samples of its batch.
 //!
 //! - `path/`: path tracing
+//! - `volume/`: path tracing through participating media
 //! - `direct.rs`: direct lighting with specular chains
 //! - `ambient.rs`: ambient occlusion
 //! - `arrival.rs`: shadow rays to light samples, in columns
@@ -21,6 +22,7 @@ mod path;
 mod queries;
 mod shadow;
 mod tracer;
+mod volume;
 
 use antumbra::Ray;
 use glam::Vec3;
@@ -144,6 +146,7 @@ pub struct Integrator {
 #[derive(Debug)]
 enum Method {
     Path(path::PathTracer),
+    Volume(volume::VolumePathTracer),
     Direct(Box<direct::DirectLighting>),
     Ambient(ambient::AmbientOcclusion),
 }
@@ -157,6 +160,18 @@ impl Integrator {
                 max_depth,
                 rr_threshold,
                 // `Lights` has applied the strategy.
+                light_strategy: _,
+            } => Method::Path(path::PathTracer::new(max_depth, rr_threshold)),
+            Scene::VolumePath {
+                max_depth,
+                rr_threshold,
+                light_strategy: _,
+            } if world.has_volumes() => {
+                Method::Volume(volume::VolumePathTracer::new(max_depth, rr_threshold))
+            }
+            Scene::VolumePath {
+                max_depth,
+                rr_threshold,
                 light_strategy: _,
             } => Method::Path(path::PathTracer::new(max_depth, rr_threshold)),
             Scene::DirectLighting {
@@ -192,6 +207,7 @@ impl Integrator {
         let shadows = &mut self.shadows;
         match &mut self.method {
             Method::Path(path) => path.trace(world, tracer, batch, shadows),
+            Method::Volume(volume) => volume.trace(world, tracer, batch),
             Method::Direct(direct) => direct.trace(world, tracer, batch, shadows),
             Method::Ambient(ambient) => ambient.trace(world, tracer, batch, shadows),
         }

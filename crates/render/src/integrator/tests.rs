@@ -24,6 +24,7 @@ fn scene(integrator: Settings) -> Scene {
         }),
         material: 0,
         area_light: emission,
+        media: None,
         alpha: None,
         shadow_alpha: None,
         reverse_orientation: false,
@@ -44,6 +45,7 @@ fn scene(integrator: Settings) -> Scene {
             kd: Vec3::splat(0.5).into(),
             sigma: 0.0.into(),
         }],
+        media: Vec::new(),
         lights: vec![Light::Infinite {
             radiance: Vec3::new(0.1, 0.2, 0.3),
             environment: None,

@@ -29,7 +29,7 @@ use antumbra::Ray;
 use glam::Vec3;
 
 use crate::color::luminance;
-use crate::surface::Surface;
+use crate::surface::{Room, Surface, offset, offset_distance, segment};
 pub use block::{Asked, ElementSample, LightBlock, LightSamples};
 pub use choice::Lights;
 pub use emitter::Emitter;
@@ -106,6 +106,27 @@ impl LightSample {
                 error,
                 normal,
             } => from.ray_to_surface(point, error, normal),
+        }
+    }
+
+    /// Shadow ray from a point that is on no surface. `origin_offset` as of [`Shapes`](crate::surface::Shapes).
+    pub fn ray_from(&self, org: Vec3, origin_offset: f32) -> Ray {
+        match self.end {
+            End::Infinity => Ray {
+                org: org.to_array(),
+                dir: self.wi.to_array(),
+                tnear: 0.0,
+                tfar: f32::INFINITY,
+            },
+            End::Point(point) => segment(org, point),
+            End::Surface {
+                point,
+                error,
+                normal,
+            } => {
+                let distance = offset_distance(error, normal, origin_offset, Room::OPEN);
+                segment(org, offset(point, normal, distance, org - point))
+            }
         }
     }
 

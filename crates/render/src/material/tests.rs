@@ -29,6 +29,7 @@ fn square_shape(normals: bool) -> Shape {
         })),
         material: 0,
         area_light: None,
+        media: None,
         alpha: None,
         shadow_alpha: None,
         reverse_orientation: false,

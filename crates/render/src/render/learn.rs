@@ -91,7 +91,9 @@ pub fn first_builder(recipe: &Recipe) -> Builder {
 fn shadow_rays_per_sample(integrator: &Integrator) -> f64 {
     match integrator {
         Integrator::AmbientOcclusion { samples, .. } => f64::from(*samples),
-        Integrator::Path { .. } | Integrator::DirectLighting { .. } => 4.0,
+        Integrator::Path { .. }
+        | Integrator::VolumePath { .. }
+        | Integrator::DirectLighting { .. } => 4.0,
     }
 }
 

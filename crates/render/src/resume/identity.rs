@@ -39,7 +39,7 @@ impl Identity {
         let film = &scene.film;
         let contents = hash(&(
             geometry(scene),
-            (&scene.materials, &scene.lights, &scene.camera),
+            (&scene.materials, &scene.lights, &scene.camera, &scene.media),
             (film.crop_window, film.filter, film.scale),
             film.max_sample_luminance,
             (scene.sampler.kind, scene.integrator),

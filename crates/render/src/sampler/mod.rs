@@ -127,6 +127,11 @@ impl Stream {
         }
     }
 
+    /// A seed of other random values, which differs by sample and dimension.
+    pub fn seed(&self, dimension: u32) -> u64 {
+        mix(self.key_of(dimension) ^ u64::from(self.index))
+    }
+
     /// A point in `[0, 1)²`.
     #[inline(always)]
     pub fn pair(&self, dimension: u32) -> [f32; 2] {

@@ -16,7 +16,7 @@ mod triangle;
 
 pub use block::{SurfaceBlock, Surfaces};
 pub use frame::{Frame, reflect, refract, same_hemisphere};
-pub use origin_offset::{Room, SEGMENT_SHARE, offset, offset_distance};
+pub use origin_offset::{Room, SEGMENT_SHARE, offset, offset_distance, segment};
 pub use point::Surface;
 pub use shapes::{Placement, Shapes};
 pub use triangle::{

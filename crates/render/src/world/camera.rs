@@ -20,6 +20,7 @@ pub struct Camera {
     step: [f32; 2],
     lens_radius: f32,
     focal_distance: f32,
+    medium: Option<u32>,
 }
 
 impl Camera {
@@ -57,6 +58,7 @@ impl Camera {
             ],
             lens_radius: camera.lens_radius,
             focal_distance: camera.focal_distance,
+            medium: camera.medium,
         })
     }
 
@@ -74,6 +76,11 @@ impl Camera {
         let [x, y] = disk(lens);
         let org = Vec3::new(x * self.lens_radius, y * self.lens_radius, 0.0);
         self.to_world(org, through * self.focal_distance - org)
+    }
+
+    /// Medium around the camera. `None` is vacuum.
+    pub fn medium(&self) -> Option<u32> {
+        self.medium
     }
 
     /// Whether rays depend on the lens point.

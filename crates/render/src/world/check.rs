@@ -1,6 +1,6 @@
 //! Refuses scenes that would panic or make no picture.
 
-use antumbra_scene::{Film, Geometry, Scene};
+use antumbra_scene::{DensityGrid, Film, Geometry, Rgb, Scene};
 
 use crate::Error;
 use crate::film::filter;
@@ -35,6 +35,7 @@ pub fn check(scene: &Scene) -> Result<(), Error> {
             }
         }
     }
+    check_media(scene)?;
     texture::check(scene)?;
     check_film(&scene.film)?;
     if scene.sampler.pixel_samples == 0 {
@@ -48,6 +49,46 @@ pub fn check(scene: &Scene) -> Result<(), Error> {
         }),
         _ => Ok(()),
     }
+}
+
+/// Checks coefficients and grids of media, and the indices that name media.
+fn check_media(scene: &Scene) -> Result<(), Error> {
+    for (index, medium) in scene.media.iter().enumerate() {
+        let colors = [medium.absorption, medium.scattering];
+        let is_good = |color: &Rgb| color.is_finite() && color.min_element() >= 0.0;
+        let reason = if !colors.iter().all(is_good) {
+            "a coefficient is negative or not finite"
+        } else if !(medium.asymmetry > -1.0 && medium.asymmetry < 1.0) {
+            "the mean cosine of the phase function is not between -1 and 1"
+        } else if medium.density.as_ref().is_some_and(is_broken) {
+            "the grid has another number of densities than of cells, a density that is negative or not finite, or a \
+             transformation without inverse"
+        } else {
+            continue;
+        };
+        return Err(Error::Medium { index, reason });
+    }
+    let media = scene.media.len();
+    let of_shapes = scene.stored_shapes().filter_map(|shape| shape.media);
+    let named = of_shapes.flat_map(|media| [media.inside, media.outside]);
+    let mut named = named.flatten().chain(scene.camera.medium);
+    match named.find(|&index| index as usize >= media) {
+        Some(index) => Err(Error::NoMedium { index, media }),
+        None => Ok(()),
+    }
+}
+
+/// Whether a grid cannot be used.
+fn is_broken(grid: &DensityGrid) -> bool {
+    let cells: u64 = grid.size.iter().map(|&size| u64::from(size)).product();
+    let determinant = grid.world_from_grid.determinant();
+    cells != grid.values.len() as u64
+        || grid.size.contains(&0)
+        || grid
+            .values
+            .iter()
+            .any(|&value| !(value >= 0.0 && value.is_finite()))
+        || !(determinant.is_finite() && determinant != 0.0)
 }
 
 /// Checks the size of the picture and the filter.

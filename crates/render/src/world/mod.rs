@@ -21,6 +21,7 @@ use crate::Error;
 use crate::clock::clock;
 use crate::light::{EmitterTree, Lights};
 use crate::material::Material;
+use crate::medium::Medium;
 use crate::surface::Shapes;
 use crate::texture::Textures;
 pub use camera::Camera;
@@ -43,6 +44,7 @@ pub struct World {
 pub struct Contents {
     pub(crate) shapes: Shapes,
     pub(crate) materials: Vec<Material>,
+    pub(crate) media: Vec<Medium>,
     pub(crate) lights: Lights,
     pub(crate) emitters: EmitterTree,
     /// Whether an occlusion query tells which light the last ray of a path meets. False if closest hits and
@@ -112,6 +114,7 @@ impl World {
         let contents = Contents {
             shapes: Shapes::new(scene, &bounds),
             materials,
+            media: scene.media.iter().map(Medium::new).collect(),
             lights,
             emitters,
             ends_by_occlusion,
@@ -135,13 +138,17 @@ impl World {
     /// The same scene through another camera, onto another film. Everything else is shared, so this takes no time.
     ///
     /// # Errors
-    /// [`Error::FieldOfView`], [`Error::CameraMatrix`], [`Error::EmptyPicture`] or [`Error::FilterRadius`].
+    /// [`Error::FieldOfView`], [`Error::CameraMatrix`], [`Error::NoMedium`], [`Error::EmptyPicture`] or [`Error::FilterRadius`].
     pub fn look(
         &self,
         camera: &antumbra_scene::Camera,
         film: &antumbra_scene::Film,
     ) -> Result<Self, Error> {
         check_film(film)?;
+        let media = self.media.len();
+        if let Some(index) = camera.medium.filter(|&index| index as usize >= media) {
+            return Err(Error::NoMedium { index, media });
+        }
         Ok(Self {
             contents: Arc::clone(&self.contents),
             camera: Camera::new(camera, film)?,
@@ -207,6 +214,12 @@ impl World {
     pub(crate) fn has_textures(&self) -> bool {
         let varies = |material: &Material| matches!(material, Material::Varying(_));
         self.materials.iter().any(varies)
+    }
+
+    /// Whether a path must look for media, or goes through surfaces without a material.
+    pub(crate) fn has_volumes(&self) -> bool {
+        let is_none = |material: &Material| matches!(material, Material::None);
+        !self.media.is_empty() || self.materials.iter().any(is_none)
     }
 
     /// Material of a shape.

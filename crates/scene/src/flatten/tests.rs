@@ -24,6 +24,7 @@ fn scene(shapes: Vec<Shape>, objects: Vec<Vec<Shape>>, places: &[(usize, Affine3
             })
             .collect(),
         materials: Vec::new(),
+        media: Vec::new(),
         lights: Vec::new(),
         camera: Default::default(),
         film: Film::default(),
@@ -39,6 +40,7 @@ fn shape(geometry: Geometry, material: usize) -> Shape {
         geometry,
         material,
         area_light: None,
+        media: None,
         alpha: None,
         shadow_alpha: None,
         reverse_orientation: false,

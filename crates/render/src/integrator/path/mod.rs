@@ -42,15 +42,15 @@ use scatter::Continuations;
 use vertices::Vertices;
 
 /// Dimensions used at each vertex of a path.
-const LIGHT_CHOICE: u32 = 0;
-const LIGHT: u32 = 1;
-const LOBE: u32 = 2;
-const DIRECTION: u32 = 3;
-const ROULETTE: u32 = 4;
+pub(super) const LIGHT_CHOICE: u32 = 0;
+pub(super) const LIGHT: u32 = 1;
+pub(super) const LOBE: u32 = 2;
+pub(super) const DIRECTION: u32 = 3;
+pub(super) const ROULETTE: u32 = 4;
 const PER_VERTEX: u32 = 5;
 
 /// Russian roulette is played from this vertex on.
-const ROULETTE_DEPTH: u32 = 4;
+pub(super) const ROULETTE_DEPTH: u32 = 4;
 
 /// The path integrator with its buffers.
 #[derive(Debug)]
@@ -98,7 +98,7 @@ struct State {
 
 /// Origin of a ray, which decides the weight of the light that it meets.
 #[derive(Clone, Copy, Debug)]
-enum Origin {
+pub(super) enum Origin {
     /// The camera or a delta lobe: no light sample could have found the light.
     Certain,
     /// A BSDF sample of this density from this point.
@@ -285,7 +285,7 @@ impl PathTracer {
 }
 
 /// First dimension of the vertices at this depth.
-fn first_dimension(depth: u32) -> u32 {
+pub(super) fn first_dimension(depth: u32) -> u32 {
     dimension::FIRST.wrapping_add(depth.wrapping_mul(PER_VERTEX))
 }
 
@@ -321,7 +321,7 @@ pub(super) fn receiver(bsdf: &Bsdf, surface: &Surface) -> Receiver {
 
 /// Emission of a surface towards the path, weighted against the light samples that could have found it.
 #[inline]
-fn emitted_light(world: &World, origin: &Origin, surface: &Surface) -> Vec3 {
+pub(super) fn emitted_light(world: &World, origin: &Origin, surface: &Surface) -> Vec3 {
     let Some((index, emitter)) = world.lights.emitter(surface.shape) else {
         return Vec3::ZERO;
     };
@@ -337,7 +337,7 @@ fn emitted_light(world: &World, origin: &Origin, surface: &Surface) -> Vec3 {
 }
 
 /// Light from outside the scene, weighted against the light samples that could have found it.
-fn escaped_light(world: &World, origin: &Origin, dir: Vec3) -> Vec3 {
+pub(super) fn escaped_light(world: &World, origin: &Origin, dir: Vec3) -> Vec3 {
     let lights = &world.lights;
     match origin {
         Origin::Certain => lights.escaped(dir),

@@ -64,7 +64,8 @@ impl Lights {
             }
         }
         let strategy = match scene.integrator {
-            Integrator::Path { light_strategy, .. } => light_strategy,
+            Integrator::Path { light_strategy, .. }
+            | Integrator::VolumePath { light_strategy, .. } => light_strategy,
             _ => LightStrategy::Spatial,
         };
         let outside = (0..lights.len()).filter(|&i| lights[i].is_outside());
@@ -319,6 +320,7 @@ mod tests {
             objects: Vec::new(),
             instances: Vec::new(),
             materials: Vec::new(),
+            media: Vec::new(),
             lights: (0..lights).map(light).collect(),
             camera: Default::default(),
             film: Default::default(),

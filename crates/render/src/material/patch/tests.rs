@@ -13,6 +13,7 @@ fn shape(geometry: Geometry) -> Shapes {
         geometry,
         material: 0,
         area_light: None,
+        media: None,
         alpha: None,
         shadow_alpha: None,
         reverse_orientation: false,

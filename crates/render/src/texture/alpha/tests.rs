@@ -41,6 +41,7 @@ fn shape(mesh: Arc<TriangleMesh>) -> Shape {
         geometry: Geometry::Mesh(mesh),
         material: 0,
         area_light: None,
+        media: None,
         alpha: None,
         shadow_alpha: None,
         reverse_orientation: false,

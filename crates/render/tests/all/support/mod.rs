@@ -19,6 +19,7 @@ pub fn empty() -> Scene {
         objects: Vec::new(),
         instances: Vec::new(),
         materials: Vec::new(),
+        media: Vec::new(),
         lights: Vec::new(),
         camera: Camera {
             fov: 0.5,
@@ -66,6 +67,7 @@ pub fn add(scene: &mut Scene, geometry: Geometry, material: Material) -> &mut Sh
         geometry,
         material: scene.materials.len() - 1,
         area_light: None,
+        media: None,
         alpha: None,
         shadow_alpha: None,
         reverse_orientation: false,

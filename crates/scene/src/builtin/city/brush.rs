@@ -97,6 +97,7 @@ impl Brushes {
                     geometry: Geometry::Mesh(Arc::new(mesh)),
                     material,
                     area_light: None,
+                    media: None,
                     alpha: None,
                     shadow_alpha: None,
                     reverse_orientation: false,

@@ -51,6 +51,7 @@ pub fn city(triangles: usize) -> Scene {
         objects: Vec::new(),
         instances: Vec::new(),
         materials,
+        media: Vec::new(),
         lights: vec![
             Light::Distant {
                 to_light: Vec3::new(-0.62, -0.34, 0.56).normalize(),
