@@ -69,6 +69,7 @@ struct Materials {
     substrate: usize,
     translucent: usize,
     fourier: usize,
+    subsurface: usize,
     mix: usize,
     metallic: usize,
     none: usize,
@@ -230,6 +231,7 @@ fn materials(scene: &Scene) -> Materials {
             Material::Substrate { .. } => &mut counts.substrate,
             Material::Translucent { .. } => &mut counts.translucent,
             Material::Fourier(_) => &mut counts.fourier,
+            Material::Subsurface { .. } => &mut counts.subsurface,
             Material::Mix { .. } => &mut counts.mix,
             Material::Metallic { .. } => &mut counts.metallic,
             // Bump maps and normal maps are not nested.
@@ -274,6 +276,7 @@ impl Materials {
             (self.substrate, "substrate"),
             (self.translucent, "translucent"),
             (self.fourier, "fourier"),
+            (self.subsurface, "subsurface"),
             (self.mix, "mix"),
             (self.metallic, "metallic"),
             (self.none, "none"),

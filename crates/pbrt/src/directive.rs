@@ -70,6 +70,28 @@ pub(crate) enum Directive {
     WorldEnd,
 }
 
+impl Directive {
+    /// List of parameters, if the directive ends with one.
+    pub fn params_mut(&mut self) -> Option<&mut Params> {
+        match self {
+            Self::Accelerator(_, params)
+            | Self::AreaLightSource(_, params)
+            | Self::Camera(_, params)
+            | Self::Film(_, params)
+            | Self::Integrator(_, params)
+            | Self::LightSource(_, params)
+            | Self::MakeNamedMaterial(_, params)
+            | Self::MakeNamedMedium(_, params)
+            | Self::Material(_, params)
+            | Self::PixelFilter(_, params)
+            | Self::Sampler(_, params)
+            | Self::Shape(_, params)
+            | Self::Texture { params, .. } => Some(params),
+            _ => None,
+        }
+    }
+}
+
 /// Receiver of directives.
 pub(crate) trait Handler {
     /// Called once per well-formed directive, in the order of the file. `at` is the place of the directive's name.

@@ -1,4 +1,8 @@
 //! Directives for materials, with the parameters and defaults of pbrt-v3.
+//!
+//! - `subsurface`: bodies in which light is scattered
+
+mod subsurface;
 
 use std::sync::Arc;
 
@@ -34,6 +38,7 @@ const OVERRIDABLE: &[&str] = &[
     "eta",
     "index",
     "k",
+    "mfp",
     "namedmaterial1",
     "namedmaterial2",
     "opacity",
@@ -41,6 +46,8 @@ const OVERRIDABLE: &[&str] = &[
     "remaproughness",
     "roughness",
     "sigma",
+    "sigma_a",
+    "sigma_s",
     "transmit",
     "uroughness",
     "vroughness",
@@ -51,6 +58,7 @@ pub(crate) const SUPPORTED: &[&str] = &[
     "disney",
     "fourier",
     "glass",
+    "kdsubsurface",
     "matte",
     "metal",
     "mirror",
@@ -58,12 +66,13 @@ pub(crate) const SUPPORTED: &[&str] = &[
     "none",
     "plastic",
     "substrate",
+    "subsurface",
     "translucent",
     "uber",
 ];
 
 /// Materials of pbrt-v3 that are not supported.
-pub(crate) const UNSUPPORTED: &[&str] = &["hair", "kdsubsurface", "subsurface"];
+pub(crate) const UNSUPPORTED: &[&str] = &["hair"];
 
 /// Handles `Material "kind"`.
 pub(crate) fn declare(
@@ -206,6 +215,8 @@ fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report)
             remap_roughness: remap_roughness(&mut values),
         },
         "disney" => disney(&mut values),
+        "subsurface" => subsurface::coefficients(&mut values),
+        "kdsubsurface" => subsurface::diffuse(&mut values),
         "fourier" => match fourier(&mut values) {
             Some(material) => material,
             None => DEFAULT,
@@ -441,6 +452,18 @@ fn mixed_material(values: &mut Textured, param: &'static str) -> Option<Material
     };
     let named = &values.state.named_materials;
     match named.get(name).map(|spec| &spec.material) {
+        Some(Material::Subsurface { .. }) => {
+            let feature = "a mixture with subsurface scattering is";
+            values.report.unsupported(span, feature);
+            None
+        }
+        Some(Material::Bumped { material, .. })
+            if matches!(**material, Material::Subsurface { .. }) =>
+        {
+            let feature = "a mixture with subsurface scattering is";
+            values.report.unsupported(span, feature);
+            None
+        }
         Some(Material::None) => {
             let message = "a mixture with material \"none\" is no surface; pbrt-v3 fails here";
             values.report.error(span, message);

@@ -168,6 +168,13 @@ pub(crate) fn parse(lexer: &mut Lexer, report: &mut Report) -> Outcome {
 }
 
 impl Params {
+    /// Adds further parameters of the same directive.
+    pub fn extend(&mut self, more: Self, report: &mut Report) {
+        for param in more.list {
+            self.add(param, report);
+        }
+    }
+
     /// Adds a parameter. An earlier one with the same name and type is replaced, as in pbrt.
     fn add(&mut self, param: Param, report: &mut Report) {
         let is_same = |p: &Param| p.name == param.name && p.param_type == param.param_type;

@@ -78,8 +78,27 @@ impl Parser {
                 continue;
             }
             match directive(lexer, report, token, name) {
-                Ok(directive) => handler.directive(token.span, directive, report),
+                Ok(mut directive) => {
+                    if let Some(params) = directive.params_mut() {
+                        self.take_parameters_of_includers(params, report);
+                    }
+                    handler.directive(token.span, directive, report);
+                }
                 Err(Failed) => skip_to_directive(lexer, report),
+            }
+        }
+    }
+
+    /// Adds the parameters after the `Include` of a file that ends with a directive: the list goes on there, as in pbrt-v3.
+    fn take_parameters_of_includers(&mut self, params: &mut Params, report: &mut Report) {
+        while self.current.peek(report).is_none() {
+            let Some((includer, _)) = self.includers.pop() else {
+                return;
+            };
+            self.current = includer;
+            match params::parse(&mut self.current, report) {
+                Outcome::Complete(more) => params.extend(more, report),
+                Outcome::Failed => skip_to_directive(&mut self.current, report),
             }
         }
     }

@@ -54,6 +54,14 @@ pub enum Error {
         /// Largest number of parts.
         limit: usize,
     },
+    /// A material with subsurface scattering cannot be rendered.
+    #[error("material {index} with subsurface scattering cannot be rendered: {reason}")]
+    Subsurface {
+        /// Index of the material.
+        index: usize,
+        /// What is wrong.
+        reason: &'static str,
+    },
     /// A participating medium cannot be used.
     #[error("medium {index} cannot be used: {reason}")]
     Medium {

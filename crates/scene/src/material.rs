@@ -123,6 +123,23 @@ pub enum Material {
         /// True if `roughness` is in 0..=1 and is mapped to a microfacet alpha, false if it is an alpha.
         remap_roughness: bool,
     },
+    /// Dielectric body in which light is scattered. The shape must be closed. No part of a mixture.
+    Subsurface {
+        /// Scale of the reflection at the surface.
+        kr: Param<Rgb>,
+        /// Scale of the light that enters.
+        kt: Param<Rgb>,
+        /// Index of refraction inside over outside.
+        eta: f32,
+        /// Roughness of the surface along u and v.
+        roughness: [Param<f32>; 2],
+        /// True if `roughness` is in 0..=1 and is mapped to a microfacet alpha, false if it is an alpha.
+        remap_roughness: bool,
+        /// What is inside.
+        interior: Interior,
+        /// Mean cosine of the scattering angle, in (-1, 1).
+        asymmetry: f32,
+    },
     /// Scattering by a table, on both sides.
     Fourier(Arc<FourierTable>),
     /// Lobes of two materials, scaled and added. Neither is [`Self::Bumped`] or [`Self::None`]: bump maps apply to the
@@ -147,6 +164,29 @@ pub enum Material {
         /// Normal as a colour from 0 to 1: red along u, green along v, blue along the surface's normal. 1/2 is 0.
         normal: Param<Rgb>,
         /// Factor of the normal's parts along u and v.
+        scale: f32,
+    },
+}
+
+/// Scattering inside of a [`Material::Subsurface`], by the place where light enters.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub enum Interior {
+    /// By coefficients per scene unit of length.
+    Coefficients {
+        /// Absorption coefficient.
+        absorption: Param<Rgb>,
+        /// Scattering coefficient.
+        scattering: Param<Rgb>,
+        /// Factor of both.
+        scale: f32,
+    },
+    /// By the look of a flat body.
+    Diffuse {
+        /// Share of diffuse light that comes back, of what enters.
+        reflectance: Param<Rgb>,
+        /// Mean free path in scene units.
+        mean_free_path: Param<Rgb>,
+        /// Factor of the mean free path.
         scale: f32,
     },
 }
@@ -237,6 +277,32 @@ impl Material {
             } => {
                 let numbers = [metallic, roughness, transmission].map(Number);
                 [&[Color(color), Color(coat)], &numbers[..]].concat()
+            }
+            Self::Subsurface {
+                kr,
+                kt,
+                eta,
+                roughness: [u, v],
+                remap_roughness: remap,
+                interior,
+                asymmetry,
+            } => {
+                let (kind, [a, b], scale) = match interior {
+                    Interior::Coefficients {
+                        absorption,
+                        scattering,
+                        scale,
+                    } => (0.0, [absorption, scattering], scale),
+                    Interior::Diffuse {
+                        reflectance,
+                        mean_free_path,
+                        scale,
+                    } => (1.0, [reflectance, mean_free_path], scale),
+                };
+                let colors = [kr, kt, a, b].map(Color);
+                let numbers = [Number(u), Number(v), switch(remap)];
+                let settings = [*eta, *asymmetry, *scale, kind].map(Setting);
+                [&colors[..], &numbers, &settings].concat()
             }
             Self::Fourier(table) => vec![Table(table)],
             Self::Mix {

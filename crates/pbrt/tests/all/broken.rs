@@ -226,7 +226,7 @@ fn a_diagnostic_shows_the_line_and_points_at_the_token() {
     let Err(error) = result else { panic!() };
     let path = folder.path().join("s.pbrt");
     let expected = format!(
-        "{}:2:11: error: unknown material \"ü\"\n    \tMaterial \"ü\"  # été\n    \t         ^^^\n    help: known: disney, fourier, glass, matte, metal, mirror, mix, none, plastic, substrate, translucent, uber",
+        "{}:2:11: error: unknown material \"ü\"\n    \tMaterial \"ü\"  # été\n    \t         ^^^\n    help: known: disney, fourier, glass, kdsubsurface, matte, metal, mirror, mix, none, plastic, substrate, subsurface, translucent, uber",
         path.display()
     );
     assert_eq!(error.to_string(), expected);

@@ -134,3 +134,35 @@ fn files_that_double_at_every_level_end_at_a_limit() {
         "{diagnostics:?}"
     );
 }
+
+/// As with the clouds of pbrt-v3's collection: a file ends within a list of parameters, which goes on behind its
+/// `Include`.
+#[test]
+fn parameters_go_on_after_an_included_file() {
+    let (_folder, result) = load_files(&[
+        (
+            "main.pbrt",
+            b"WorldBegin Include \"a.pbrt\" \"rgb sigma_a\" [1 2 3] \"float g\" 0.25 Shape \"sphere\" WorldEnd",
+        ),
+        ("a.pbrt", b"Include \"b.pbrt\" \"rgb sigma_s\" [4 5 6]"),
+        (
+            "b.pbrt",
+            b"MakeNamedMedium \"m\" \"string type\" \"homogeneous\"\n# the list has no end here",
+        ),
+    ]);
+    let scene = result.unwrap().scene;
+    let medium = &scene.media[0];
+    assert_eq!(medium.absorption, antumbra_scene::Rgb::new(1.0, 2.0, 3.0));
+    assert_eq!(medium.scattering, antumbra_scene::Rgb::new(4.0, 5.0, 6.0));
+    assert_eq!((medium.asymmetry, scene.shapes.len()), (0.25, 1));
+    // A directive without parameters takes none.
+    let (_folder, result) = load_files(&[
+        (
+            "main.pbrt",
+            b"WorldBegin Include \"a.pbrt\" \"float g\" 1 WorldEnd",
+        ),
+        ("a.pbrt", b"ReverseOrientation"),
+    ]);
+    let message = complaints(result)[0].message.clone();
+    assert!(message.contains("expected a directive"), "{message}");
+}

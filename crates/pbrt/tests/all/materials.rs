@@ -2,7 +2,7 @@
 
 use antumbra_scene::{Material, Param, Rgb, Scene};
 
-use super::world;
+use super::{load_text, tolerated, world};
 
 const TRIANGLE: &str =
     r#"Shape "trianglemesh" "integer indices" [0 1 2] "point P" [0 0 0 1 0 0 0 1 0] "#;
@@ -193,4 +193,54 @@ fn equal_materials_are_one() {
     ));
     let materials: Vec<_> = scene.shapes.iter().map(|shape| shape.material).collect();
     assert_eq!(materials, [0, 1, 0, 2, 2, 3]);
+}
+
+#[test]
+fn subsurface_scattering_has_the_defaults_of_pbrt() {
+    use antumbra_scene::Interior;
+    let scene = load_text(
+        r#"WorldBegin
+        Material "subsurface" Shape "sphere"
+        Material "subsurface" "string name" "Ketchup" "float g" 0.9 "float scale" 2 "float uroughness" 0.05
+        Shape "sphere"
+        Material "kdsubsurface" "rgb Kd" [.1 .2 .3] "rgb mfp" [1 2 3] "float eta" 1.5 Shape "sphere"
+        WorldEnd"#,
+    )
+    .unwrap()
+    .scene;
+    let found: Vec<_> = (scene.materials.iter())
+        .map(|material| match material {
+            Material::Subsurface {
+                interior,
+                eta,
+                asymmetry,
+                ..
+            } => (interior.clone(), *eta, *asymmetry),
+            other => panic!("{other:?}"),
+        })
+        .collect();
+    let coefficients = |absorption: [f32; 3], scattering: [f32; 3], scale| Interior::Coefficients {
+        absorption: Rgb::from(absorption).into(),
+        scattering: Rgb::from(scattering).into(),
+        scale,
+    };
+    let milk = coefficients([0.0011, 0.0024, 0.014], [2.55, 3.21, 3.77], 1.0);
+    let ketchup = coefficients([0.061, 0.97, 1.45], [0.18, 0.07, 0.03], 2.0);
+    let diffuse = Interior::Diffuse {
+        reflectance: Rgb::new(0.1, 0.2, 0.3).into(),
+        mean_free_path: Rgb::new(1.0, 2.0, 3.0).into(),
+        scale: 1.0,
+    };
+    assert_eq!(
+        found,
+        [(milk, 1.33, 0.0), (ketchup, 1.33, 0.0), (diffuse, 1.5, 0.0)]
+    );
+    let (_, warnings) = tolerated(
+        r#"WorldBegin Material "subsurface" "string name" "Cheese" Shape "sphere" WorldEnd"#,
+    );
+    assert!(
+        warnings
+            .iter()
+            .any(|warning| warning.message.contains("\"Cheese\""))
+    );
 }

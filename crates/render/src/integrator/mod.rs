@@ -161,19 +161,26 @@ impl Integrator {
                 rr_threshold,
                 // `Lights` has applied the strategy.
                 light_strategy: _,
-            } => Method::Path(path::PathTracer::new(max_depth, rr_threshold)),
-            Scene::VolumePath {
-                max_depth,
-                rr_threshold,
-                light_strategy: _,
-            } if world.has_volumes() => {
-                Method::Volume(volume::VolumePathTracer::new(max_depth, rr_threshold))
+            } if !world.has_bodies() => {
+                Method::Path(path::PathTracer::new(max_depth, rr_threshold))
             }
             Scene::VolumePath {
                 max_depth,
                 rr_threshold,
                 light_strategy: _,
-            } => Method::Path(path::PathTracer::new(max_depth, rr_threshold)),
+            } if !world.has_volumes() => {
+                Method::Path(path::PathTracer::new(max_depth, rr_threshold))
+            }
+            Scene::Path {
+                max_depth,
+                rr_threshold,
+                light_strategy: _,
+            }
+            | Scene::VolumePath {
+                max_depth,
+                rr_threshold,
+                light_strategy: _,
+            } => Method::Volume(volume::VolumePathTracer::new(max_depth, rr_threshold)),
             Scene::DirectLighting {
                 strategy,
                 max_depth,

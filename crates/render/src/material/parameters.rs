@@ -6,9 +6,10 @@ use antumbra_scene::{FourierTable, Param, Rgb};
 use glam::Vec3;
 
 use super::bsdf::{
-    Blend, Bsdf, Diffuse, Fourier, Fresnel, GlossyReflection, GlossyTransmission, Lobe, Metallic,
-    MetallicParameters, Specular, TrowbridgeReitz,
+    Blend, Bsdf, Diffuse, Fourier, Fresnel, GlossyReflection, GlossyTransmission, Interface, Lobe,
+    Metallic, MetallicParameters, Specular, Subsurface, TrowbridgeReitz, albedo_of,
 };
+use crate::medium::Coefficients;
 use crate::texture::{Input, Place, Textures, Value};
 
 /// Lowered parameters of an [`antumbra_scene::Material`].
@@ -66,11 +67,49 @@ pub enum Parameters {
         coat: Input<Rgb>,
         transparent: Input<f32>,
     },
+    Subsurface {
+        kr: Input<Rgb>,
+        kt: Input<Rgb>,
+        eta: f32,
+        roughness: Roughness,
+        interior: Interior,
+        asymmetry: f32,
+    },
     Fourier(Arc<FourierTable>),
     Mix {
         parameterss: Box<[Parameters; 2]>,
         amount: Input<Rgb>,
     },
+}
+
+/// What is inside of a body.
+#[derive(Clone, Debug)]
+pub enum Interior {
+    /// Absorption and scattering, and the factor of both.
+    Coefficients([Input<Rgb>; 2], f32),
+    /// Diffuse reflectance and mean free path, and the factor of the second.
+    Diffuse([Input<Rgb>; 2], f32),
+}
+
+impl Interior {
+    fn coefficients(&self, place: &Place, eta: f32, asymmetry: f32) -> Coefficients {
+        /// Shortest mean free path. Zero would let no light travel.
+        const SHORTEST: Vec3 = Vec3::splat(1e-8);
+        match self {
+            Self::Coefficients(inputs, scale) => {
+                let [a, s] = inputs
+                    .each_ref()
+                    .map(|input| input.at(place).max(Vec3::ZERO));
+                Coefficients::new(a * scale, s * scale)
+            }
+            Self::Diffuse([reflectance, path], scale) => {
+                let albedo = albedo_of(reflectance.at(place), eta, asymmetry);
+                let attenuation = (path.at(place) * scale).max(SHORTEST).recip();
+                let scattering = attenuation * albedo;
+                Coefficients::new(attenuation - scattering, scattering)
+            }
+        }
+    }
 }
 
 /// Roughness along u and v, and whether to map it to the alpha of microfacets.
@@ -194,6 +233,39 @@ impl Lowering<'_> {
                 reflect: self.input(reflect),
                 transmit: self.input(transmit),
                 roughness: self.roughness([roughness; 2], *remap_roughness),
+            },
+            Scene::Subsurface {
+                kr,
+                kt,
+                eta,
+                roughness: [u, v],
+                remap_roughness,
+                interior,
+                asymmetry,
+            } => Parameters::Subsurface {
+                kr: self.input(kr),
+                kt: self.input(kt),
+                eta: *eta,
+                roughness: self.roughness([u, v], *remap_roughness),
+                interior: match interior {
+                    antumbra_scene::Interior::Coefficients {
+                        absorption,
+                        scattering,
+                        scale,
+                    } => Interior::Coefficients(
+                        [absorption, scattering].map(|p| self.input(p)),
+                        *scale,
+                    ),
+                    antumbra_scene::Interior::Diffuse {
+                        reflectance,
+                        mean_free_path,
+                        scale,
+                    } => Interior::Diffuse(
+                        [reflectance, mean_free_path].map(|p| self.input(p)),
+                        *scale,
+                    ),
+                },
+                asymmetry: *asymmetry,
             },
             Scene::Fourier(table) => Parameters::Fourier(Arc::clone(table)),
             Scene::Mix { materials, amount } => Parameters::Mix {
@@ -341,6 +413,35 @@ impl Parameters {
                     coat: lobe.coat(),
                 };
                 Bsdf::lobes(vec![Lobe::Metallic(lobe), Lobe::Specular(sheet)])
+            }
+            Self::Subsurface {
+                kr,
+                kt,
+                eta,
+                roughness,
+                interior,
+                asymmetry,
+            } => {
+                let (kr, eta) = (color(kr), *eta);
+                let surface = if roughness.values(place) == [0.0, 0.0] {
+                    Bsdf::specular(Specular::Glass {
+                        kr,
+                        kt: Vec3::ZERO,
+                        eta,
+                    })
+                } else {
+                    let facets = roughness.facets(place);
+                    let fresnel = Fresnel::Dielectric(eta);
+                    let reflection = GlossyReflection::new(kr, facets, fresnel);
+                    Bsdf::lobes(vec![Lobe::Glossy(reflection)])
+                };
+                Bsdf::Subsurface(Box::new(Subsurface {
+                    surface,
+                    kt: color(kt),
+                    interface: Interface::new(eta),
+                    coefficients: interior.coefficients(place, eta, *asymmetry),
+                    asymmetry: *asymmetry,
+                }))
             }
             Self::Fourier(table) => {
                 Bsdf::lobes(vec![Lobe::Fourier(Fourier::new(Arc::clone(table)))])

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use antumbra_scene::DensityGrid;
 use glam::{Mat4, Vec3};
 
-use super::{Event, Medium, Random};
+use super::{Coefficients, Event, Random};
 
 /// Transmittance below which ratio tracking plays roulette.
 const FAINT: f32 = 0.1;
@@ -84,14 +84,14 @@ impl Grid {
     /// 2019). With equal attenuation coefficients they are the albedo, or 1.
     pub fn event(
         &self,
-        medium: &Medium,
+        coefficients: &Coefficients,
         [org, dir]: [Vec3; 2],
         end: f32,
         (hero, share): (usize, Vec3),
         random: &mut Random,
     ) -> Event {
         let passed = Event::Passed { weight: Vec3::ONE };
-        let majorant = medium.attenuation.max_element() * self.largest;
+        let majorant = coefficients.attenuation.max_element() * self.largest;
         let Some((org, dir, [mut distance, end])) = self.clip(org, dir, end) else {
             return passed;
         };
@@ -108,10 +108,10 @@ impl Grid {
                 return Event::Passed { weight };
             }
             let relative = self.density(org + dir * distance) / majorant;
-            let real = medium.attenuation * relative;
+            let real = coefficients.attenuation * relative;
             if random.next() < real[hero] {
                 let density = (share * real * nulls).element_sum();
-                let weight = medium.scattering * relative * nulls / density;
+                let weight = coefficients.scattering * relative * nulls / density;
                 return Event::Scattered { distance, weight };
             }
             nulls *= (Vec3::ONE - real).max(Vec3::ZERO);
@@ -123,14 +123,14 @@ impl Grid {
     /// Estimate of the transmittance, by ratio tracking.
     pub fn transmittance(
         &self,
-        medium: &Medium,
+        coefficients: &Coefficients,
         org: Vec3,
         dir: Vec3,
         end: f32,
         random: &mut Random,
     ) -> Vec3 {
         let mut passed = Vec3::ONE;
-        let majorant = medium.attenuation.max_element() * self.largest;
+        let majorant = coefficients.attenuation.max_element() * self.largest;
         let Some((org, dir, [mut distance, end])) = self.clip(org, dir, end) else {
             return passed;
         };
@@ -143,7 +143,7 @@ impl Grid {
                 return passed;
             }
             let density = self.density(org + dir * distance);
-            passed *= (Vec3::ONE - medium.attenuation * (density / majorant)).max(Vec3::ZERO);
+            passed *= (Vec3::ONE - coefficients.attenuation * (density / majorant)).max(Vec3::ZERO);
             let most = passed.max_element();
             if most < FAINT {
                 let end = (1.0 - most).max(0.05);

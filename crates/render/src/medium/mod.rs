@@ -17,13 +17,19 @@ pub use random::Random;
 /// A participating medium, ready for sampling. All coefficients are per unit of length in the world.
 #[derive(Clone, Debug)]
 pub struct Medium {
-    /// Scattering coefficient at density 1.
-    scattering: Vec3,
-    /// Attenuation coefficient at density 1: absorption plus scattering.
-    attenuation: Vec3,
+    /// Coefficients at density 1.
+    coefficients: Coefficients,
     /// Mean cosine of the scattering angle.
     pub asymmetry: f32,
     grid: Option<Grid>,
+}
+
+/// Coefficients of a homogeneous medium.
+#[derive(Clone, Copy, Debug)]
+pub struct Coefficients {
+    scattering: Vec3,
+    /// Absorption plus scattering.
+    attenuation: Vec3,
 }
 
 /// First event of a ray in a medium.
@@ -47,8 +53,7 @@ impl Medium {
     /// Prepares a medium of the scene.
     pub fn new(medium: &antumbra_scene::Medium) -> Self {
         Self {
-            scattering: medium.scattering,
-            attenuation: medium.absorption + medium.scattering,
+            coefficients: Coefficients::new(medium.absorption, medium.scattering),
             asymmetry: medium.asymmetry,
             grid: medium.density.as_ref().map(Grid::new),
         }
@@ -66,33 +71,39 @@ impl Medium {
         throughput: Vec3,
         random: &mut Random,
     ) -> Event {
-        let throughput = throughput.max(Vec3::ZERO);
-        let total = throughput.element_sum();
-        let share = if total > 0.0 && total.is_finite() {
-            throughput / total
-        } else {
-            Vec3::splat(1.0 / 3.0)
-        };
-        let choice = random.next();
-        let hero = if choice < share.x {
-            0
-        } else if choice < share.x + share.y || share.z == 0.0 {
-            1
-        } else {
-            2
-        };
+        let choice = hero(throughput, random);
         match &self.grid {
-            Some(grid) => grid.event(self, [org, dir], end, (hero, share), random),
-            None => self.homogeneous_event(end, (hero, share), random),
+            Some(grid) => grid.event(&self.coefficients, [org, dir], end, choice, random),
+            None => self.coefficients.event_of(end, choice, random),
         }
     }
 
-    fn homogeneous_event(
-        &self,
-        end: f32,
-        (hero, share): (usize, Vec3),
-        random: &mut Random,
-    ) -> Event {
+    /// Transmittance between `org` and the point at distance `end` along the unit vector `dir`: exact for a homogeneous
+    /// medium, and an unbiased estimate for a grid.
+    pub fn transmittance(&self, org: Vec3, dir: Vec3, end: f32, random: &mut Random) -> Vec3 {
+        match &self.grid {
+            Some(grid) => grid.transmittance(&self.coefficients, org, dir, end, random),
+            None => self.coefficients.transmittance(end),
+        }
+    }
+}
+
+impl Coefficients {
+    /// Coefficients of absorption and scattering.
+    pub fn new(absorption: Vec3, scattering: Vec3) -> Self {
+        Self {
+            scattering,
+            attenuation: absorption + scattering,
+        }
+    }
+
+    /// [`Medium::event`] of a homogeneous medium.
+    pub fn event(&self, end: f32, throughput: Vec3, random: &mut Random) -> Event {
+        let choice = hero(throughput, random);
+        self.event_of(end, choice, random)
+    }
+
+    fn event_of(&self, end: f32, (hero, share): (usize, Vec3), random: &mut Random) -> Event {
         let rate = self.attenuation[hero];
         let distance = -libm::logf(1.0 - random.next()) / rate;
         if distance < end {
@@ -105,7 +116,7 @@ impl Medium {
             };
             return Event::Scattered { distance, weight };
         }
-        let passed = self.homogeneous_transmittance(end);
+        let passed = self.transmittance(end);
         let probability = (share * passed).element_sum();
         let weight = if probability > 0.0 {
             passed / probability
@@ -115,19 +126,30 @@ impl Medium {
         Event::Passed { weight }
     }
 
-    fn homogeneous_transmittance(&self, end: f32) -> Vec3 {
+    fn transmittance(&self, end: f32) -> Vec3 {
         // No attenuation over an infinite distance is none.
         exp(-self.attenuation * end.min(f32::MAX))
     }
+}
 
-    /// Transmittance between `org` and the point at distance `end` along the unit vector `dir`: exact for a homogeneous
-    /// medium, and an unbiased estimate for a grid.
-    pub fn transmittance(&self, org: Vec3, dir: Vec3, end: f32, random: &mut Random) -> Vec3 {
-        match &self.grid {
-            Some(grid) => grid.transmittance(self, org, dir, end, random),
-            None => self.homogeneous_transmittance(end),
-        }
-    }
+/// A colour drawn in proportion to the throughput, with the probabilities of all colours.
+fn hero(throughput: Vec3, random: &mut Random) -> (usize, Vec3) {
+    let throughput = throughput.max(Vec3::ZERO);
+    let total = throughput.element_sum();
+    let share = if total > 0.0 && total.is_finite() {
+        throughput / total
+    } else {
+        Vec3::splat(1.0 / 3.0)
+    };
+    let choice = random.next();
+    let hero = if choice < share.x {
+        0
+    } else if choice < share.x + share.y || share.z == 0.0 {
+        1
+    } else {
+        2
+    };
+    (hero, share)
 }
 
 fn exp(exponent: Vec3) -> Vec3 {

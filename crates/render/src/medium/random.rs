@@ -29,7 +29,7 @@ impl Random {
     }
 
     /// Next pair of numbers in `[0, 1)²`.
-    #[cfg(test)]
+    #[inline]
     pub fn pair(&mut self) -> [f32; 2] {
         [self.next(), self.next()]
     }

@@ -1,6 +1,6 @@
 //! Refuses scenes that would panic or make no picture.
 
-use antumbra_scene::{DensityGrid, Film, Geometry, Rgb, Scene};
+use antumbra_scene::{DensityGrid, Film, Geometry, Integrator, Material, Rgb, Scene};
 
 use crate::Error;
 use crate::film::filter;
@@ -36,6 +36,7 @@ pub fn check(scene: &Scene) -> Result<(), Error> {
         }
     }
     check_media(scene)?;
+    check_bodies(scene)?;
     texture::check(scene)?;
     check_film(&scene.film)?;
     if scene.sampler.pixel_samples == 0 {
@@ -49,6 +50,46 @@ pub fn check(scene: &Scene) -> Result<(), Error> {
         }),
         _ => Ok(()),
     }
+}
+
+/// Whether light wanders inside of shapes of this material.
+pub fn is_body(material: &Material) -> bool {
+    match material {
+        Material::Subsurface { .. } => true,
+        Material::Bumped { material, .. } | Material::NormalMapped { material, .. } => {
+            is_body(material)
+        }
+        Material::Mix { materials, .. } => materials.iter().any(|part| is_body(part)),
+        _ => false,
+    }
+}
+
+/// Refuses bodies where the integrator does not follow light inside, in mixtures, and with impossible numbers.
+fn check_bodies(scene: &Scene) -> Result<(), Error> {
+    for (index, material) in scene
+        .materials
+        .iter()
+        .enumerate()
+        .filter(|(_, m)| is_body(m))
+    {
+        let inner = match material {
+            Material::Bumped { material, .. } | Material::NormalMapped { material, .. } => material,
+            material => material,
+        };
+        let reason = match (inner, scene.integrator) {
+            (_, Integrator::DirectLighting { .. }) => "directlighting does not follow light inside",
+            (Material::Subsurface { eta, asymmetry, .. }, _) => {
+                let good = *eta > 0.0 && eta.is_finite() && asymmetry.abs() < 1.0;
+                if good {
+                    continue;
+                }
+                "the index of refraction or the mean cosine is out of range"
+            }
+            _ => "it is part of a mixture",
+        };
+        return Err(Error::Subsurface { index, reason });
+    }
+    Ok(())
 }
 
 /// Checks coefficients and grids of media, and the indices that name media.

@@ -44,6 +44,7 @@ pub struct World {
 pub struct Contents {
     pub(crate) shapes: Shapes,
     pub(crate) materials: Vec<Material>,
+    has_bodies: bool,
     pub(crate) media: Vec<Medium>,
     pub(crate) lights: Lights,
     pub(crate) emitters: EmitterTree,
@@ -114,6 +115,7 @@ impl World {
         let contents = Contents {
             shapes: Shapes::new(scene, &bounds),
             materials,
+            has_bodies: scene.materials.iter().any(check::is_body),
             media: scene.media.iter().map(Medium::new).collect(),
             lights,
             emitters,
@@ -216,10 +218,15 @@ impl World {
         self.materials.iter().any(varies)
     }
 
+    /// Whether light wanders inside of bodies.
+    pub(crate) fn has_bodies(&self) -> bool {
+        self.has_bodies
+    }
+
     /// Whether a path must look for media, or goes through surfaces without a material.
     pub(crate) fn has_volumes(&self) -> bool {
         let is_none = |material: &Material| matches!(material, Material::None);
-        !self.media.is_empty() || self.materials.iter().any(is_none)
+        !self.media.is_empty() || self.has_bodies || self.materials.iter().any(is_none)
     }
 
     /// Material of a shape.

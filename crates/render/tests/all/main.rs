@@ -11,6 +11,7 @@
 //! - `scales`: tiny, huge and distant scenes
 //! - `refused`: bad scenes and options, and monitors that stop a rendering
 //! - `figures`: counts, predictions, cost maps and standard errors
+//! - `subsurface`: bodies in which light is scattered
 //! - `support`: small scenes that these share
 
 mod closed;
@@ -26,4 +27,5 @@ mod resume;
 mod same_bits;
 mod samplers;
 mod scales;
+mod subsurface;
 mod support;

@@ -7,10 +7,13 @@
 //! therefore traced from surface to surface, and attenuated in between (`connections.rs`). Where every surface
 //! blocks light, an occlusion query decides.
 //!
+//! Light that enters a body with subsurface scattering walks until it leaves (`wander.rs`).
+//!
 //! pbrt-v3 does not find the emission of a surface without a material by sampling the BSDF, and yet weights light samples
 //! as if it did. Here both techniques find such light.
 
 mod connections;
+mod wander;
 
 use antumbra::Ray;
 use glam::Vec3;
@@ -30,6 +33,7 @@ use crate::sampler::Stream;
 use crate::surface::{Frame, Surface};
 use crate::world::World;
 use connections::{Connection, Connections};
+use wander::Walk;
 
 /// Dimension of the seed for tracking through media. Far from the dimensions of all vertices.
 const TRACKING: u32 = 0x8000_0000;
@@ -64,6 +68,8 @@ struct State {
     depth: u32,
     /// Medium in which the ray begins. `None` is vacuum.
     medium: Option<u32>,
+    /// Walk inside of a body, if the path is on one.
+    walk: Option<Walk>,
     /// Random numbers for tracking.
     random: Random,
     /// Whether the ray comes straight from the camera.
@@ -116,6 +122,7 @@ impl VolumePathTracer {
                 origin: Origin::Certain,
                 depth: 0,
                 medium: world.camera.medium(),
+                walk: None,
                 random: Random::new(batch.streams[sample].seed(TRACKING)),
                 from_camera: true,
             };
@@ -137,6 +144,10 @@ impl VolumePathTracer {
     fn advance(&mut self, world: &World, batch: &mut Batch, index: usize) {
         let ray = self.current.rays[index];
         let mut state = self.current.states[index];
+        if let Some(walk) = state.walk {
+            self.wander(world, batch, index, (walk, state));
+            return;
+        }
         let dir = Vec3::from(ray.dir);
         let hit = self.hits.hit(index).copied();
         if let Some(medium) = medium(world, state.medium) {
@@ -194,6 +205,18 @@ impl VolumePathTracer {
         let stream = batch.streams[state.sample as usize];
         let dimension = first_dimension(state.depth);
         let wo = frame.to_local(surface.wo);
+        let bsdf = match bsdf {
+            Bsdf::Subsurface(body) => {
+                let enters = body.chance_to_enter(wo.z);
+                if state.random.next() < enters {
+                    self.enter(world, surface, (body, frame), enters, state);
+                    return;
+                }
+                state.throughput /= 1.0 - enters;
+                &body.surface
+            }
+            bsdf => bsdf,
+        };
         let at = receiver(bsdf, surface);
         let delta_share = bsdf.delta_share();
         if delta_share < 1.0

@@ -10,6 +10,7 @@
 //! - `metallic.rs`: dielectrics and metals by glTF's model, with `albedo.rs`, what their facets reflect in all
 //! - `fourier.rs`: tables of measured or simulated scattering
 //! - `specular.rs`: perfect mirrors and smooth dielectrics
+//! - `subsurface.rs`: bodies in which light wanders
 //!
 //! All values equal those of pbrt-v3, two habits included:
 //!
@@ -27,6 +28,7 @@ mod lobe;
 mod metallic;
 mod microfacet;
 mod specular;
+mod subsurface;
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -44,6 +46,7 @@ pub use lobe::{Lobe, Lobes};
 pub use metallic::{Coat, Metallic, MetallicParameters};
 pub use microfacet::TrowbridgeReitz;
 pub use specular::{Specular, SpecularSample};
+pub use subsurface::{Interface, Subsurface, albedo_of};
 
 /// How a point of a surface scatters light.
 ///
@@ -65,6 +68,8 @@ pub enum Bsdf {
     Metallic(Metallic),
     /// A mirror or a smooth dielectric: only delta lobes.
     Specular(Specular),
+    /// A surface above a body in which light wanders. Here only the surface counts.
+    Subsurface(Box<Subsurface>),
     /// Anything else.
     Lobes(Lobes),
 }
@@ -154,6 +159,7 @@ impl Bsdf {
             }
             Self::Metallic(metallic) => vec![Lobe::Metallic(metallic)],
             Self::Specular(specular) => vec![Lobe::Specular(specular)],
+            Self::Subsurface(body) => body.surface.into_lobes(),
             Self::Lobes(lobes) => lobes.into_vec(),
         }
     }
@@ -179,6 +185,7 @@ impl Bsdf {
     pub fn delta_share(&self) -> f32 {
         match self {
             Self::Specular(_) => 1.0,
+            Self::Subsurface(body) => body.surface.delta_share(),
             Self::Lobes(lobes) => lobes.delta_share(),
             _ => 0.0,
         }
@@ -202,6 +209,7 @@ impl Bsdf {
             Self::Glossy(coat) | Self::Plastic(_, coat) => coat.is_anisotropic(),
             Self::RoughGlass(Some(reflection), _) => reflection.is_anisotropic(),
             Self::RoughGlass(None, Some(transmission)) => transmission.is_anisotropic(),
+            Self::Subsurface(body) => body.surface.is_anisotropic(),
             Self::Lobes(lobes) => lobes.is_anisotropic(),
             _ => false,
         }
@@ -261,6 +269,7 @@ impl Bsdf {
                 sum.pdf /= lobes;
                 sum
             }
+            Self::Subsurface(body) => body.surface.evaluate(wo, wi, reflects),
             Self::Lobes(lobes) => lobes.evaluate(wo, wi, reflects),
         }
     }
@@ -290,6 +299,7 @@ impl Bsdf {
                 (Some(reflection), None) => reflection.sample(wo, u),
                 (None, None) => None,
             },
+            Self::Subsurface(body) => body.surface.sample(wo, lobe, u),
             Self::Lobes(lobes) => lobes.sample(wo, lobe, u),
         }
     }
@@ -299,6 +309,7 @@ impl Bsdf {
     pub fn sample_delta(&self, wo: Vec3, choice: f32) -> Option<SpecularSample> {
         match self {
             Self::Specular(specular) => specular.sample(wo, choice),
+            Self::Subsurface(body) => body.surface.sample_delta(wo, choice),
             Self::Lobes(lobes) => lobes.sample_delta(wo, choice),
             _ => None,
         }
@@ -336,6 +347,7 @@ impl Bsdf {
     pub fn delta_reflection(&self, wo: Vec3) -> Option<SpecularSample> {
         match self {
             Self::Specular(specular) => specular.reflection(wo),
+            Self::Subsurface(body) => body.surface.delta_reflection(wo),
             Self::Lobes(lobes) => lobes.delta_reflection(wo),
             _ => None,
         }

@@ -1,0 +1,92 @@
+//! Materials `subsurface` and `kdsubsurface`.
+
+use antumbra_scene::{Interior, Material, Param, Rgb};
+
+use super::{remap_roughness, roughness_along};
+use crate::presets;
+use crate::suggest;
+use crate::texture::Textured;
+
+/// Material `subsurface`: by coefficients, or by the name of a measured material.
+pub(super) fn coefficients(values: &mut Textured) -> Material {
+    let mut found = presets::DEFAULT;
+    let mut asymmetry = asymmetry(values);
+    let named = values.lookup.string("name", values.report);
+    if let Some((name, span)) = named.filter(|(name, _)| !name.is_empty()) {
+        match presets::by_name(name) {
+            Some(preset) => {
+                found = preset;
+                // Measured coefficients are reduced ones.
+                asymmetry = 0.0;
+            }
+            None => values.report.tolerated(
+                span,
+                format!("no material is named {name:?}"),
+                "the coefficients of whole milk are taken",
+                || suggest::help(name, &presets::names()),
+            ),
+        }
+    }
+    let interior = Interior::Coefficients {
+        absorption: color(values, "sigma_a", found.absorption),
+        scattering: color(values, "sigma_s", found.scattering),
+        scale: scale(values),
+    };
+    body(values, interior, asymmetry)
+}
+
+/// Material `kdsubsurface`: by diffuse reflectance and mean free path.
+pub(super) fn diffuse(values: &mut Textured) -> Material {
+    let mean_free_path = color(values, "mfp", Rgb::ONE);
+    if let Param::Constant(path) = mean_free_path
+        && path.min_element() <= 0.0
+    {
+        let message = format!("\"mfp\" must be positive, found {path}");
+        values.report.error(values.lookup.at, message);
+    }
+    let interior = Interior::Diffuse {
+        reflectance: color(values, "Kd", Rgb::splat(0.5)),
+        mean_free_path,
+        scale: scale(values),
+    };
+    let asymmetry = asymmetry(values);
+    body(values, interior, asymmetry)
+}
+
+fn body(values: &mut Textured, interior: Interior, asymmetry: f32) -> Material {
+    let range = [f32::MIN_POSITIVE, f32::MAX];
+    let eta = values.lookup.float_in("eta", 1.33, range, values.report);
+    values.report.note(
+        values.lookup.at,
+        "subsurface scattering is rendered by walks inside of shapes, which must be closed",
+    );
+    Material::Subsurface {
+        kr: values.param("Kr", 1.0),
+        kt: values.param("Kt", 1.0),
+        eta,
+        roughness: roughness_along(values, 0.0),
+        remap_roughness: remap_roughness(values),
+        interior,
+        asymmetry,
+    }
+}
+
+fn color(values: &mut Textured, name: &'static str, default: Rgb) -> Param<Rgb> {
+    let found = values.find(name);
+    found.map_or(Param::Constant(default), |(value, _)| value)
+}
+
+fn scale(values: &mut Textured) -> f32 {
+    let range = [f32::MIN_POSITIVE, f32::MAX];
+    values.lookup.float_in("scale", 1.0, range, values.report)
+}
+
+fn asymmetry(values: &mut Textured) -> f32 {
+    let found = values.lookup.float("g", 0.0, values.report);
+    if found.abs() < 1.0 {
+        return found;
+    }
+    let message = format!("\"g\" must be between -1 and 1, found {found}");
+    values.report.error(values.lookup.at, message);
+    0.0
+}
