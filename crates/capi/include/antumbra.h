@@ -279,7 +279,8 @@ ANTUMBRA_API void antumbra_threads_free(antumbra_threads *threads);
  * number is the `geom_id` of hits. All arrays are copied. Scenes are not needed after the build, unless for a refit.
  *
  * Primitives that cannot be hit are dropped at build and counted in the report: those with a NaN or an infinite coordinate,
- * triangles with two equal corners, spheres and disks without a positive radius, disks without a normal.
+ * triangles with two equal corners, spheres and disks without a positive radius, disks without a normal, segments of curves
+ * with two equal ends, a negative radius or two radii of 0.
  * ------------------------------------------------------------------------------------------------------------------------ */
 
 /* A list of geometries. */
@@ -343,6 +344,15 @@ ANTUMBRA_API antumbra_status antumbra_scene_add_spheres(antumbra_scene *scene, c
 ANTUMBRA_API antumbra_status antumbra_scene_add_disks(antumbra_scene *scene, const float *centers, size_t center_stride,
                                                       const float *normals, size_t normal_stride, const float *radii,
                                                       size_t radius_stride, size_t count, uint32_t *geom_id);
+
+/* Adds thin curves: hair, fur, grass. `points` are x, y, z and radius. Segment i is straight, goes from point `segments[i]`
+ * to the next one, and has the prim_id i. One that begins where the one before it in the list ends goes on there without a
+ * gap. Without `segments` (NULL) all points are one curve, of one segment less. Segments are flat and face every ray, as
+ * Embree's flat curves; rays hit what is within the radius of the axis. `u` of a hit goes along the segment, `v` across it,
+ * with 1/2 on the axis. */
+ANTUMBRA_API antumbra_status antumbra_scene_add_curves(antumbra_scene *scene, const float *points, size_t point_count,
+                                                       size_t point_stride, const uint32_t *segments, size_t segment_count,
+                                                       size_t segment_stride, uint32_t *geom_id);
 
 /* A hit on user geometry: the distance in multiples of the direction, and two numbers of your choice. */
 typedef struct antumbra_user_hit {

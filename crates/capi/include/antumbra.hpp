@@ -367,6 +367,20 @@ public:
                                        first == nullptr ? nullptr : first + 6, stride, disks.size(), &id));
         return id;
     }
+    // Four numbers for each point: place and radius. Segments are given by their first points.
+    std::uint32_t add_curves(tuples<float, 4> points, tuples<std::uint32_t, 1> segments) {
+        std::uint32_t id = 0;
+        check(antumbra_scene_add_curves(get(), points.data(), points.size(), points.stride(), some(segments), segments.size(),
+                                        segments.stride(), &id));
+        return id;
+    }
+    // One curve through all points.
+    std::uint32_t add_curves(tuples<float, 4> points) {
+        std::uint32_t id = 0;
+        std::size_t count = points.size() == 0 ? 0 : points.size() - 1;
+        check(antumbra_scene_add_curves(get(), points.data(), points.size(), points.stride(), nullptr, count, 0, &id));
+        return id;
+    }
     // User geometry of an object with the functions
     //     Box bounds(std::uint32_t prim_id) const;
     //     std::optional<UserHit> intersect(std::uint32_t prim_id, const Ray &ray) const;

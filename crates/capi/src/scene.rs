@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use antumbra::cutout::Opacity;
-use antumbra::{Disk, Geometry, LocalOrigin, Sphere, TriangleMesh, UserGeometry};
+use antumbra::{Curves, Disk, Geometry, LocalOrigin, Sphere, TriangleMesh, UserGeometry};
 
 use crate::arrays::{Items, Slot, exclusive, shared, take_back};
 use crate::functions::{OpacityFunction, UserFunctions};
@@ -31,6 +31,10 @@ pub enum Part {
     },
     Spheres(Vec<Sphere>),
     Disks(Vec<Disk>),
+    Curves {
+        points: Vec<[f32; 4]>,
+        segments: Vec<u32>,
+    },
     User(u32, Arc<dyn UserGeometry>),
 }
 
@@ -50,6 +54,9 @@ impl Part {
             Self::Quads { positions, indices } => Geometry::quads(&positions[..], &indices[..]),
             Self::Spheres(spheres) => Geometry::spheres(&spheres[..]),
             Self::Disks(disks) => Geometry::disks(&disks[..]),
+            Self::Curves { points, segments } => {
+                Geometry::curves(Curves::new(&points[..], &segments[..]))
+            }
             Self::User(count, shape) => Geometry::user(*count, Arc::clone(shape)),
         }
     }
@@ -221,6 +228,44 @@ pub unsafe extern "C" fn antumbra_scene_add_disks(
             radius: radii.get(index),
         });
         scene.add(Part::Disks(disks.collect()), geom_id)
+    })
+}
+
+/// Adds thin curves.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn antumbra_scene_add_curves(
+    scene: *mut Scene,
+    points: *const f32,
+    point_count: usize,
+    point_stride: usize,
+    segments: *const u32,
+    segment_count: usize,
+    segment_stride: usize,
+    geom_id: *mut u32,
+) -> Status {
+    guarded(|| {
+        // SAFETY: the header says what is at these addresses.
+        let (scene, points, geom_id) = unsafe {
+            let points =
+                Items::<[f32; 4]>::new(points.cast(), point_count, point_stride, "points")?;
+            let geom_id = Slot::optional(geom_id, "geom_id")?;
+            (exclusive(scene, "scene")?, points.to_vec(), geom_id)
+        };
+        let whole = point_count.saturating_sub(1);
+        let segments = if !segments.is_null() {
+            // SAFETY: as above.
+            unsafe { Items::new(segments, segment_count, segment_stride, "segments") }?.to_vec()
+        } else if segment_count != whole {
+            return Err(Failure::argument(format_args!(
+                "without `segments`, {point_count} points are one curve of {whole} segments, not {segment_count}"
+            )));
+        } else {
+            match u32::try_from(whole) {
+                Ok(count) => (0..count).collect(),
+                Err(_) => return Err(Failure::new(Status::TooMany, "more than 2^32 segments")),
+            }
+        };
+        scene.add(Part::Curves { points, segments }, geom_id)
     })
 }
 

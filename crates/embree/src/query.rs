@@ -242,10 +242,10 @@ pub fn in_object(
 ///
 /// # Safety
 /// Arguments as the caller documents, or null.
-pub unsafe fn start<'a>(
-    scene: &'a Scene,
+pub unsafe fn start(
+    scene: &Scene,
     arguments: *const Arguments,
-) -> Outcome<(&'a Committed, Option<&'a Arguments>)> {
+) -> Outcome<(&Committed, Option<&Arguments>)> {
     // SAFETY: the caller's arguments.
     Ok((scene.committed()?, unsafe { arguments.as_ref() }))
 }

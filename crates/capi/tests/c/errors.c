@@ -55,6 +55,7 @@ int main(void) {
     WRONG(antumbra_scene_add_quads(scene, corners, 6, 0, NULL, 1, 0, NULL), "4 times as many vertices");
     WRONG(antumbra_scene_add_spheres(scene, corners, 0, NULL, 0, 1, NULL), "`radii` is null");
     WRONG(antumbra_scene_add_spheres(scene, corners, 4, &radius, 0, 1, NULL), "stride of `centers`");
+    WRONG(antumbra_scene_add_curves(scene, corners, 2, 0, NULL, 2, 0, NULL), "one curve of 1 segments, not 2");
     WRONG(antumbra_scene_add_disks(scene, corners, 0, NULL, 0, &radius, 0, 1, NULL), "`normals` is null");
     WRONG(antumbra_scene_add_user(scene, 1, NULL, NULL), "`functions` is null");
     WRONG(antumbra_scene_add_user(scene, 1, &functions, NULL), "bounds` is null");

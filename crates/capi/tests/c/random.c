@@ -97,7 +97,7 @@ static void fill_scene(antumbra_scene *scene) {
         float *first = numbers + below(100);
         uint32_t geom_id = 0;
         bool is;
-        switch (below(7)) {
+        switch (below(8)) {
         case 0:
             is = done(antumbra_scene_add_triangles(scene, first, 3 * count, stride, NULL, count - (below(9) == 0), 0, &geom_id));
             break;
@@ -111,6 +111,10 @@ static void fill_scene(antumbra_scene *scene) {
         case 3:
             is = done(antumbra_scene_add_disks(scene, first, stride, first + 3, below(2) ? 12 : ANTUMBRA_SAME_FOR_ALL, first + 6, 8,
                                                count, &geom_id));
+            break;
+        case 5:
+            is = done(antumbra_scene_add_curves(scene, first, 100 + below(60), stride, below(3) ? indices : NULL, count, 0,
+                                                &geom_id));
             break;
         case 4:
             is = done(antumbra_scene_add_user(scene, (uint32_t)count % 20, &functions, &geom_id));

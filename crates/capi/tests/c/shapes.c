@@ -187,6 +187,38 @@ static void opacity(void) {
     antumbra_threads_free(threads);
 }
 
+static void curves(void) {
+    /* Along y, the second segment to a tip; as one curve, and by its segments in another order, which cuts them apart. */
+    const float points[12] = {0.0f, -1.0f, 1.0f, 0.5f, 0.0f, 0.0f, 1.0f, 0.5f, 0.0f, 1.0f, 1.0f, 0.0f};
+    const uint32_t segments[2] = {1, 0};
+    antumbra_scene *scene;
+    antumbra_bvh *bvh;
+    antumbra_hit hit;
+    antumbra_ray ray;
+    uint32_t ids[2];
+
+    OK(antumbra_scene_new(&scene));
+    OK(antumbra_scene_add_curves(scene, points, 3, 0, NULL, 2, 0, &ids[0]));
+    OK(antumbra_bvh_build(scene, NULL, &bvh));
+    ray = down(0.25f, -0.5f);
+    OK(antumbra_intersect1(bvh, &ray, &hit));
+    CHECK(hit.t == 9.0f && hit.geom_id == ids[0] && hit.prim_id == 0 && hit.u == 0.5f && hit.v == 0.25f);
+    ray = down(0.2f, 0.5f);
+    OK(antumbra_intersect1(bvh, &ray, &hit));
+    CHECK(hit.prim_id == 1);
+    ray = down(0.3f, 0.5f);
+    OK(antumbra_intersect1(bvh, &ray, &hit));
+    CHECK(hit.geom_id == ANTUMBRA_INVALID_ID);
+    antumbra_bvh_free(bvh);
+
+    OK(antumbra_scene_add_curves(scene, points, 3, 16, segments, 2, 4, &ids[1]));
+    CHECK(ids[0] == 0 && ids[1] == 1);
+    OK(antumbra_scene_set_mask(scene, 0, 0));
+    OK(antumbra_bvh_build(scene, NULL, &bvh));
+    antumbra_bvh_free(bvh);
+    antumbra_scene_free(scene);
+}
+
 static void solids(void) {
     /* Two spheres with their radii between them, a disk, a quad. */
     const float spheres[8] = {0.0f, 0.0f, 0.0f, 2.0f, 10.0f, 0.0f, 0.0f, 1.0f};
@@ -371,6 +403,7 @@ static void nothing(void) {
 }
 
 int main(void) {
+    curves();
     solids();
     user_geometry();
     opacity();

@@ -123,7 +123,7 @@ fn light_scattered_once_equals_its_integral() {
         });
         let found = estimate(&picture(&scene, 256));
         // Light travels along -to_light, and on along -z to the camera.
-        let (g, cos) = (f64::from(asymmetry), 0.8_f64 * -1.0);
+        let (g, cos) = (f64::from(asymmetry), -0.8_f64);
         let phase = (1.0 - g * g) / (4.0 * PI * (1.0 + g * g - 2.0 * g * cos).powf(1.5));
         let rate = f64::from(sigma_a + sigma_s) * (1.0 + 1.0 / 0.8);
         let integral = (1.0 - f64::exp(-rate * f64::from(depth))) / rate;
