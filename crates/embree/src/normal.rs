@@ -35,17 +35,20 @@ pub fn normal(
 }
 
 /// Corners of a primitive, as the buffers have them now.
+#[inline]
 pub fn corners<const N: usize>(state: &State, prim: usize) -> Option<[[f32; 3]; N]> {
     let index = state.index.as_ref().filter(|index| prim < index.count)?;
     let vertices = state.vertices.as_ref()?;
     let indices = index.read::<N, u32>(prim);
-    if indices
-        .iter()
-        .any(|corner| *corner as usize >= vertices.count)
-    {
-        return None;
+    let mut corners = [[0.0; 3]; N];
+    // A loop: closures over arrays are not inlined, and cost as much as the reads.
+    for (corner, index) in corners.iter_mut().zip(indices) {
+        if index as usize >= vertices.count {
+            return None;
+        }
+        *corner = vertices.read(index as usize);
     }
-    Some(indices.map(|corner| vertices.read(corner as usize)))
+    Some(corners)
 }
 
 fn item<const N: usize>(view: Option<&crate::buffer::View>, prim: usize) -> Option<[f32; N]> {
