@@ -85,7 +85,8 @@ fn the_summary_lists_every_page_of_the_book() {
     for entry in std::fs::read_dir(source).expect("a folder") {
         let name = entry.expect("an entry").file_name();
         let name = name.to_str().expect("a name");
-        assert!(listed.contains(&name) || name == "SUMMARY.md", "{name}");
+        let is_page = name.ends_with(".md") && name != "SUMMARY.md";
+        assert!(!is_page || listed.contains(&name), "{name}");
     }
 }
 
