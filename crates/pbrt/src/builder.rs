@@ -478,6 +478,15 @@ impl<'o> Builder<'o> {
         };
         let read = shape::read(kind, &mut values, &to_world, middle);
         let material = material::of_shape(current.as_deref(), &mut lookup, &self.state, report);
+        if material::hair::is_hair(&material) {
+            let curve_type = lookup.string("type", report).map(|(name, _)| name);
+            if kind.text != "curve" || curve_type == Some("ribbon") {
+                report.unsupported(
+                    at,
+                    "hair on other shapes than flat and cylindrical curves is",
+                );
+            }
+        }
         lookup.finish(report);
         let Some((source, cutouts)) = read else {
             return;

@@ -1,7 +1,9 @@
 //! Directives for materials, with the parameters and defaults of pbrt-v3.
 //!
+//! - `hair`: hair
 //! - `subsurface`: bodies in which light is scattered
 
+pub(crate) mod hair;
 mod subsurface;
 
 use std::sync::Arc;
@@ -58,6 +60,7 @@ pub(crate) const SUPPORTED: &[&str] = &[
     "disney",
     "fourier",
     "glass",
+    "hair",
     "kdsubsurface",
     "matte",
     "metal",
@@ -70,9 +73,6 @@ pub(crate) const SUPPORTED: &[&str] = &[
     "translucent",
     "uber",
 ];
-
-/// Materials of pbrt-v3 that are not supported.
-pub(crate) const UNSUPPORTED: &[&str] = &["hair"];
 
 /// Handles `Material "kind"`.
 pub(crate) fn declare(
@@ -215,6 +215,7 @@ fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report)
             remap_roughness: remap_roughness(&mut values),
         },
         "disney" => disney(&mut values),
+        "hair" => hair::hair(&mut values),
         "subsurface" => subsurface::coefficients(&mut values),
         "kdsubsurface" => subsurface::diffuse(&mut values),
         "fourier" => match fourier(&mut values) {
@@ -222,12 +223,6 @@ fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report)
             None => DEFAULT,
         },
         "mix" => return mix(&mut values),
-        other if UNSUPPORTED.contains(&other) => {
-            let report = &mut values.report;
-            report.unsupported_kind(kind.span, "material", other, SUPPORTED);
-            values.lookup.ignore_all();
-            return DEFAULT;
-        }
         other => {
             let mistake = format!("unknown material {other:?}");
             let help = || suggest::help(other, SUPPORTED);

@@ -57,7 +57,7 @@ const GROUPS: &[Group] = &[
     Group {
         heading: "Materials",
         supported: material::SUPPORTED,
-        unsupported: material::UNSUPPORTED,
+        unsupported: &[],
         scene: r#"WorldBegin Material "NAME" WorldEnd"#,
     },
     Group {

@@ -54,9 +54,9 @@ pub enum Error {
         /// Largest number of parts.
         limit: usize,
     },
-    /// A material with subsurface scattering cannot be rendered.
-    #[error("material {index} with subsurface scattering cannot be rendered: {reason}")]
-    Subsurface {
+    /// A material with light inside, subsurface scattering or hair, cannot be rendered.
+    #[error("material {index}, subsurface scattering or hair, cannot be rendered: {reason}")]
+    Interior {
         /// Index of the material.
         index: usize,
         /// What is wrong.

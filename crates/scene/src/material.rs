@@ -140,6 +140,17 @@ pub enum Material {
         /// Mean cosine of the scattering angle, in (-1, 1).
         asymmetry: f32,
     },
+    /// Hair (Chiang, Bitterli, Tappan and Burley 2016). The shape must be a closed tube with texture coordinates along it.
+    Hair {
+        /// Absorption inside.
+        pigment: Pigment,
+        /// Index of refraction.
+        eta: Param<f32>,
+        /// Roughness along the hair and around it, 0..=1.
+        roughness: [Param<f32>; 2],
+        /// Tilt of the scales in degrees.
+        tilt: Param<f32>,
+    },
     /// Scattering by a table, on both sides.
     Fourier(Arc<FourierTable>),
     /// Lobes of two materials, scaled and added. Neither is [`Self::Bumped`] or [`Self::None`]: bump maps apply to the
@@ -166,6 +177,17 @@ pub enum Material {
         /// Factor of the normal's parts along u and v.
         scale: f32,
     },
+}
+
+/// Absorption inside of a [`Material::Hair`].
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub enum Pigment {
+    /// Absorption coefficient per radius of the hair.
+    Absorption(Param<Rgb>),
+    /// Colour of many hairs together.
+    Color(Param<Rgb>),
+    /// Concentrations of eumelanin and pheomelanin.
+    Melanin([Param<f32>; 2]),
 }
 
 /// Scattering inside of a [`Material::Subsurface`], by the place where light enters.
@@ -303,6 +325,19 @@ impl Material {
                 let numbers = [Number(u), Number(v), switch(remap)];
                 let settings = [*eta, *asymmetry, *scale, kind].map(Setting);
                 [&colors[..], &numbers, &settings].concat()
+            }
+            Self::Hair {
+                pigment,
+                eta,
+                roughness: [m, n],
+                tilt,
+            } => {
+                let inside = match pigment {
+                    Pigment::Absorption(color) => vec![Setting(0.0), Color(color)],
+                    Pigment::Color(color) => vec![Setting(1.0), Color(color)],
+                    Pigment::Melanin([eu, pheo]) => vec![Setting(2.0), Number(eu), Number(pheo)],
+                };
+                [&inside[..], &[eta, m, n, tilt].map(Number)].concat()
             }
             Self::Fourier(table) => vec![Table(table)],
             Self::Mix {

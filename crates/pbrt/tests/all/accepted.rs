@@ -627,7 +627,7 @@ fn unsupported_features_can_be_left_out() {
     let (scene, warnings) = tolerated(&format!(
         r#"Camera "realistic" WorldBegin
         Shape "paraboloid"
-        Material "hair" "float eta" 1.5 {TRIANGLE}
+        Material "disney" "float sheen" 1 {TRIANGLE}
         Shape "cone"
         Shape "nurbs"
         ObjectBegin "o" Shape "sphere" ObjectEnd

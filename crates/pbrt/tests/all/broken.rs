@@ -84,7 +84,7 @@ WorldBegin WorldEnd"#, r#"16 numbers in [ ]"#),
         (r#"Camera ›"orthographic" WorldBegin WorldEnd"#, r#"not supported yet"#),
         (r#"Accelerator "qbvh" "string order" ›"random" WorldBegin WorldEnd"#, r#"known: simple, sort+"#),
         (r#"Accelerator "bvh" ›"string order" "simple" WorldBegin WorldEnd"#, r#"no parameter "order""#),
-        (r#"WorldBegin Material ›"hair" WorldEnd"#, r#""hair" is not supported yet"#),
+        (r#"WorldBegin Material "hair" ›Shape "sphere" WorldEnd"#, r#"hair on other shapes"#),
         (r#"WorldBegin ›Material "mix" "string namedmaterial1" "a" WorldEnd"#, r#"needs a parameter "namedmaterial2""#),
         (r#"WorldBegin Material "mix" "string namedmaterial1" ›"a" "string namedmaterial2" "a" WorldEnd"#, r#"no material is named "a""#),
         (r#"WorldBegin MakeNamedMaterial "a" "string type" "none" MakeNamedMaterial "b" "string type" "matte" Material "mix" "string namedmaterial1" ›"a" "string namedmaterial2" "b" WorldEnd"#, r#"is no surface"#),
@@ -226,7 +226,7 @@ fn a_diagnostic_shows_the_line_and_points_at_the_token() {
     let Err(error) = result else { panic!() };
     let path = folder.path().join("s.pbrt");
     let expected = format!(
-        "{}:2:11: error: unknown material \"ü\"\n    \tMaterial \"ü\"  # été\n    \t         ^^^\n    help: known: disney, fourier, glass, kdsubsurface, matte, metal, mirror, mix, none, plastic, substrate, subsurface, translucent, uber",
+        "{}:2:11: error: unknown material \"ü\"\n    \tMaterial \"ü\"  # été\n    \t         ^^^\n    help: known: disney, fourier, glass, hair, kdsubsurface, matte, metal, mirror, mix, none, plastic, substrate, subsurface, translucent, uber",
         path.display()
     );
     assert_eq!(error.to_string(), expected);

@@ -244,3 +244,38 @@ fn subsurface_scattering_has_the_defaults_of_pbrt() {
             .any(|warning| warning.message.contains("\"Cheese\""))
     );
 }
+
+#[test]
+fn hair_has_the_defaults_of_pbrt() {
+    use antumbra_scene::Pigment;
+    let curve = r#"Shape "curve" "string type" "cylinder" "float width" 0.1 "point P" [0 0 0 1 0 0 2 0 0 3 0 0]"#;
+    let scene = load_text(&format!(
+        r#"WorldBegin
+        Material "hair" {curve}
+        Material "hair" "rgb color" [.5 .2 .1] "float eumelanin" 3 "float beta_n" .7 {curve}
+        Material "hair" "float pheomelanin" .2 "float eta" 1.6 "float alpha" 3 "float beta_m" .1 {curve}
+        WorldEnd"#,
+    ))
+    .unwrap()
+    .scene;
+    let hair = |pigment, eta: f32, roughness: [f32; 2], tilt: f32| Material::Hair {
+        pigment,
+        eta: eta.into(),
+        roughness: roughness.map(Param::Constant),
+        tilt: tilt.into(),
+    };
+    let melanin = |amounts: [f32; 2]| Pigment::Melanin(amounts.map(Param::Constant));
+    assert_eq!(
+        scene.materials,
+        [
+            hair(melanin([1.3, 0.0]), 1.55, [0.3, 0.3], 2.0),
+            hair(
+                Pigment::Color(Rgb::new(0.5, 0.2, 0.1).into()),
+                1.55,
+                [0.3, 0.7],
+                2.0
+            ),
+            hair(melanin([0.0, 0.2]), 1.6, [0.1, 0.3], 3.0),
+        ]
+    );
+}

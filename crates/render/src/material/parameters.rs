@@ -6,8 +6,9 @@ use antumbra_scene::{FourierTable, Param, Rgb};
 use glam::Vec3;
 
 use super::bsdf::{
-    Blend, Bsdf, Diffuse, Fourier, Fresnel, GlossyReflection, GlossyTransmission, Interface, Lobe,
-    Metallic, MetallicParameters, Specular, Subsurface, TrowbridgeReitz, albedo_of,
+    Blend, Bsdf, Diffuse, Fourier, Fresnel, GlossyReflection, GlossyTransmission, Hair, Interface,
+    Lobe, Metallic, MetallicParameters, Specular, Subsurface, TrowbridgeReitz, absorption_of_color,
+    absorption_of_melanin, albedo_of,
 };
 use crate::medium::Coefficients;
 use crate::texture::{Input, Place, Textures, Value};
@@ -75,11 +76,25 @@ pub enum Parameters {
         interior: Interior,
         asymmetry: f32,
     },
+    Hair {
+        pigment: Pigment,
+        eta: Input<f32>,
+        roughness: [Input<f32>; 2],
+        tilt: Input<f32>,
+    },
     Fourier(Arc<FourierTable>),
     Mix {
         parameterss: Box<[Parameters; 2]>,
         amount: Input<Rgb>,
     },
+}
+
+/// Absorption inside of hair.
+#[derive(Clone, Debug)]
+pub enum Pigment {
+    Absorption(Input<Rgb>),
+    Color(Input<Rgb>),
+    Melanin([Input<f32>; 2]),
 }
 
 /// What is inside of a body.
@@ -267,6 +282,25 @@ impl Lowering<'_> {
                 },
                 asymmetry: *asymmetry,
             },
+            Scene::Hair {
+                pigment,
+                eta,
+                roughness,
+                tilt,
+            } => Parameters::Hair {
+                pigment: match pigment {
+                    antumbra_scene::Pigment::Absorption(color) => {
+                        Pigment::Absorption(self.input(color))
+                    }
+                    antumbra_scene::Pigment::Color(color) => Pigment::Color(self.input(color)),
+                    antumbra_scene::Pigment::Melanin(melanin) => {
+                        Pigment::Melanin(melanin.each_ref().map(|value| self.input(value)))
+                    }
+                },
+                eta: self.input(eta),
+                roughness: roughness.each_ref().map(|value| self.input(value)),
+                tilt: self.input(tilt),
+            },
             Scene::Fourier(table) => Parameters::Fourier(Arc::clone(table)),
             Scene::Mix { materials, amount } => Parameters::Mix {
                 parameterss: Box::new([
@@ -296,6 +330,15 @@ impl Lowering<'_> {
 }
 
 impl Parameters {
+    /// Whether a part is hair.
+    pub fn is_fiber(&self) -> bool {
+        match self {
+            Self::Hair { .. } => true,
+            Self::Mix { parameterss, .. } => parameterss.iter().any(Self::is_fiber),
+            _ => false,
+        }
+    }
+
     /// BSDF at a place. Negative colours count as 0, as in pbrt.
     pub fn bsdf(&self, place: &Place) -> Bsdf {
         let color = |input: &Input<Rgb>| input.at(place).max(Vec3::ZERO);
@@ -442,6 +485,23 @@ impl Parameters {
                     coefficients: interior.coefficients(place, eta, *asymmetry),
                     asymmetry: *asymmetry,
                 }))
+            }
+            Self::Hair {
+                pigment,
+                eta,
+                roughness,
+                tilt,
+            } => {
+                let roughness = roughness.each_ref().map(|value| value.at(place));
+                let absorption = match pigment {
+                    Pigment::Absorption(value) => color(value),
+                    Pigment::Color(value) => absorption_of_color(color(value), roughness[1]),
+                    Pigment::Melanin(melanin) => {
+                        absorption_of_melanin(melanin.each_ref().map(|value| value.at(place)))
+                    }
+                };
+                let hair = Hair::new(eta.at(place), absorption, roughness, tilt.at(place));
+                Bsdf::lobes(vec![Lobe::Hair(hair)])
             }
             Self::Fourier(table) => {
                 Bsdf::lobes(vec![Lobe::Fourier(Fourier::new(Arc::clone(table)))])

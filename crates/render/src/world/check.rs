@@ -52,15 +52,24 @@ pub fn check(scene: &Scene) -> Result<(), Error> {
     }
 }
 
-/// Whether light wanders inside of shapes of this material.
+/// Whether light goes on inside of shapes of this material.
 pub fn is_body(material: &Material) -> bool {
     match material {
+        Material::Hair { .. } => true,
         Material::Subsurface { .. } => true,
         Material::Bumped { material, .. } | Material::NormalMapped { material, .. } => {
             is_body(material)
         }
         Material::Mix { materials, .. } => materials.iter().any(|part| is_body(part)),
         _ => false,
+    }
+}
+
+/// Whether a part of a material is a body with subsurface scattering.
+fn is_subsurface(material: &Material) -> bool {
+    match material {
+        Material::Mix { materials, .. } => materials.iter().any(|part| is_subsurface(part)),
+        material => matches!(material, Material::Subsurface { .. }),
     }
 }
 
@@ -85,9 +94,13 @@ fn check_bodies(scene: &Scene) -> Result<(), Error> {
                 }
                 "the index of refraction or the mean cosine is out of range"
             }
+            (Material::Hair { .. }, _) => continue,
+            (Material::Mix { materials, .. }, _) if !materials.iter().any(|m| is_subsurface(m)) => {
+                continue;
+            }
             _ => "it is part of a mixture",
         };
-        return Err(Error::Subsurface { index, reason });
+        return Err(Error::Interior { index, reason });
     }
     Ok(())
 }

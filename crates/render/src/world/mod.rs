@@ -102,20 +102,23 @@ impl World {
         let emitters = EmitterTree::new(&lowered.world, |shape| lights.emitter(shape).is_some())?;
         let camera = Camera::new(&scene.camera, &scene.film)?;
         let materials = scene.materials.iter();
-        let materials = materials
+        let materials: Vec<Material> = materials
             .map(|material| Material::new(material, &mut textures))
             .collect();
         let has_surface = |material: &antumbra_scene::Material| {
             !matches!(material, antumbra_scene::Material::None)
         };
+        let is_fiber = |material: &Material| material.is_fiber();
+        let has_fibers = materials.iter().any(is_fiber);
         let ends_by_occlusion = scene.materials.iter().all(has_surface)
+            && !has_fibers
             && scene
                 .stored_shapes()
                 .all(|shape| shape.shadow_alpha.is_none());
         let contents = Contents {
             shapes: Shapes::new(scene, &bounds),
             materials,
-            has_bodies: scene.materials.iter().any(check::is_body),
+            has_bodies: has_fibers || scene.materials.iter().any(check::is_body),
             media: scene.media.iter().map(Medium::new).collect(),
             lights,
             emitters,
@@ -218,7 +221,7 @@ impl World {
         self.materials.iter().any(varies)
     }
 
-    /// Whether light wanders inside of bodies.
+    /// Whether light goes on inside of bodies or hair.
     pub(crate) fn has_bodies(&self) -> bool {
         self.has_bodies
     }

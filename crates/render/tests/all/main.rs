@@ -3,6 +3,7 @@
 //! - `closed_form`, `environments`, `materials`: pictures whose radiance is known on paper
 //! - `closed`: closed dark bodies are black inside
 //! - `media`: participating media
+//! - `hair`: fibres
 //! - `references`: pictures of the shared scenes against pbrt-v3, where they are present
 //! - `samplers`: every sampler has the same mean
 //! - `same_bits`: choices that change no bit, and choices that do
@@ -18,6 +19,7 @@ mod closed;
 mod closed_form;
 mod environments;
 mod figures;
+mod hair;
 mod live;
 mod materials;
 mod media;

@@ -6,8 +6,7 @@ use glam::Vec3;
 use super::super::Batch;
 use super::super::hits::Hits;
 use super::super::tracer::Tracer;
-use super::{medium, medium_beyond};
-use crate::material::Material;
+use super::{lets_pass, medium, medium_beyond};
 use crate::medium::Random;
 use crate::surface::SEGMENT_SHARE;
 use crate::world::World;
@@ -96,9 +95,9 @@ impl Connections {
         let Some(surface) = self.hits.surface(&world.shapes, &self.rays, index) else {
             return;
         };
-        let Material::None = world.material(surface.shape) else {
+        if !lets_pass(world, &surface) {
             return;
-        };
+        }
         connection.pass(world, hit.t);
         let dir = Vec3::from(connection.ray.dir);
         connection.medium = medium_beyond(world, &surface, dir, connection.medium);

@@ -9,6 +9,8 @@
 //!
 //! Light that enters a body with subsurface scattering walks until it leaves (`wander.rs`).
 //!
+//! Hair is a tube that scatters at its outside for the light inside as well. Rays pass its inside.
+//!
 //! pbrt-v3 does not find the emission of a surface without a material by sampling the BSDF, and yet weights light samples
 //! as if it did. Here both techniques find such light.
 
@@ -173,7 +175,7 @@ impl VolumePathTracer {
         batch.emitted[sample] += state.throughput * emitted_light(world, &state.origin, &surface);
         let made;
         let (bsdf, frame) = match world.material(surface.shape) {
-            Material::None => {
+            _ if lets_pass(world, &surface) => {
                 state.medium = medium_beyond(world, &surface, dir, state.medium);
                 state.from_camera = false;
                 if state.throughput != Vec3::ZERO {
@@ -181,6 +183,7 @@ impl VolumePathTracer {
                 }
                 return;
             }
+            Material::None => return,
             Material::Constant(bsdf) => (bsdf, shading_frame(world, bsdf, &surface)),
             Material::Varying(varying) => {
                 let near = neighbours(world, batch, &ray, state.from_camera);
@@ -335,6 +338,17 @@ impl VolumePathTracer {
 /// Medium by its index.
 fn medium(world: &World, index: Option<u32>) -> Option<&Medium> {
     index.map(|index| &world.media[index as usize])
+}
+
+/// Whether rays and light go on straight through a surface: one without a material, or a fibre that is hit from inside.
+fn lets_pass(world: &World, surface: &Surface) -> bool {
+    let material = world.material(surface.shape);
+    if let Material::None = material {
+        return true;
+    }
+    let is_inside = surface.wo.dot(surface.normal) < 0.0;
+    // Reversed normals point inward.
+    is_inside != world.shapes[surface.shape].reverse_orientation && material.is_fiber()
 }
 
 /// Medium of a ray along `dir` that leaves a surface, which it reached through the medium `here`.

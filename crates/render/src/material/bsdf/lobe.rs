@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use super::specular::SpecularSample;
 use super::{
-    Blend, Diffuse, Evaluation, Fourier, GlossyReflection, GlossyTransmission, Metallic, Specular,
-    cosine_side,
+    Blend, Diffuse, Evaluation, Fourier, GlossyReflection, GlossyTransmission, Hair, Metallic,
+    Specular, cosine_side,
 };
 use crate::surface::same_hemisphere;
 
@@ -28,6 +28,8 @@ pub enum Lobe {
     Metallic(Metallic),
     /// Scattering to both sides by a table.
     Fourier(Fourier),
+    /// A hair.
+    Hair(Hair),
     /// A delta lobe.
     Specular(Specular),
 }
@@ -43,6 +45,7 @@ impl Lobe {
             Self::Blend(lobe) => Self::Blend(lobe.scaled(scale)),
             Self::Metallic(lobe) => Self::Metallic(lobe.scaled(scale)),
             Self::Fourier(lobe) => Self::Fourier(lobe.scaled(scale)),
+            Self::Hair(lobe) => Self::Hair(lobe.scaled(scale)),
             Self::Specular(lobe) => Self::Specular(lobe.scaled(scale)),
         }
     }
@@ -56,13 +59,17 @@ impl Lobe {
             Self::Blend(lobe) => lobe.is_black(),
             Self::Metallic(lobe) => lobe.is_black(),
             Self::Fourier(lobe) => lobe.is_black(),
+            Self::Hair(lobe) => lobe.is_black(),
             Self::Specular(lobe) => lobe.is_black(),
         }
     }
 
     fn transmits(&self) -> bool {
         match self {
-            Self::DiffuseTransmission(_) | Self::GlossyTransmission(_) | Self::Fourier(_) => true,
+            Self::DiffuseTransmission(_)
+            | Self::GlossyTransmission(_)
+            | Self::Fourier(_)
+            | Self::Hair(_) => true,
             Self::Specular(lobe) => lobe.transmits(),
             Self::Diffuse(_) | Self::Glossy(_) | Self::Blend(_) | Self::Metallic(_) => false,
         }
@@ -70,7 +77,7 @@ impl Lobe {
 
     /// Whether the lobe has a value where light is reflected, or where it is transmitted.
     fn is_of(&self, reflects: bool) -> bool {
-        matches!(self, Self::Fourier(_)) || self.transmits() != reflects
+        matches!(self, Self::Fourier(_) | Self::Hair(_)) || self.transmits() != reflects
     }
 
     fn is_anisotropic(&self) -> bool {
@@ -78,6 +85,7 @@ impl Lobe {
             Self::Glossy(lobe) => lobe.is_anisotropic(),
             Self::GlossyTransmission(lobe) => lobe.is_anisotropic(),
             Self::Blend(lobe) => lobe.is_anisotropic(),
+            Self::Hair(_) => true,
             Self::Diffuse(_)
             | Self::DiffuseTransmission(_)
             | Self::Metallic(_)
@@ -120,6 +128,7 @@ impl Lobe {
                 value: lobe.value(wo, wi),
                 pdf: lobe.pdf(wo, wi),
             },
+            Self::Hair(lobe) => lobe.evaluate(wo, wi),
             Self::Specular(_) => Evaluation::default(),
         }
     }
@@ -133,6 +142,7 @@ impl Lobe {
             Self::Blend(lobe) => lobe.sample(wo, choice, u),
             Self::Metallic(lobe) => lobe.sample(wo, choice, u),
             Self::Fourier(lobe) => lobe.sample(wo, u),
+            Self::Hair(lobe) => lobe.sample(wo, choice, u),
             Self::Specular(_) => None,
         }
     }
@@ -186,6 +196,11 @@ impl Lobes {
     /// Whether a lobe depends on the tangent.
     pub fn is_anisotropic(&self) -> bool {
         self.lobes.iter().any(Lobe::is_anisotropic)
+    }
+
+    /// Whether one of the lobes is a hair.
+    pub fn is_fiber(&self) -> bool {
+        self.lobes.iter().any(|lobe| matches!(lobe, Lobe::Hair(_)))
     }
 
     /// Relative index of refraction, see [`super::Bsdf::eta`].

@@ -9,6 +9,7 @@
 //! - `blend.rs`: a coat that takes its share from the base
 //! - `metallic.rs`: dielectrics and metals by glTF's model, with `albedo.rs`, what their facets reflect in all
 //! - `fourier.rs`: tables of measured or simulated scattering
+//! - `hair.rs`: fibres
 //! - `specular.rs`: perfect mirrors and smooth dielectrics
 //! - `subsurface.rs`: bodies in which light wanders
 //!
@@ -24,6 +25,7 @@ mod diffuse;
 mod fourier;
 mod fresnel;
 mod glossy;
+mod hair;
 mod lobe;
 mod metallic;
 mod microfacet;
@@ -42,6 +44,7 @@ pub use diffuse::Diffuse;
 pub use fourier::Fourier;
 pub use fresnel::Fresnel;
 pub use glossy::{GlossyReflection, GlossyTransmission};
+pub use hair::{Hair, absorption_of_color, absorption_of_melanin};
 pub use lobe::{Lobe, Lobes};
 pub use metallic::{Coat, Metallic, MetallicParameters};
 pub use microfacet::TrowbridgeReitz;
@@ -213,6 +216,11 @@ impl Bsdf {
             Self::Lobes(lobes) => lobes.is_anisotropic(),
             _ => false,
         }
+    }
+
+    /// Whether this is a fibre, of which only the outside scatters.
+    pub fn is_fiber(&self) -> bool {
+        matches!(self, Self::Lobes(lobes) if lobes.is_fiber())
     }
 
     /// Index of refraction inside over outside of the lobe that spreads light to the other side. 1 without one.
