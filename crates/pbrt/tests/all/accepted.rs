@@ -627,7 +627,7 @@ fn unsupported_features_can_be_left_out() {
     let (scene, warnings) = tolerated(&format!(
         r#"Camera "realistic" WorldBegin
         Shape "paraboloid"
-        Material "disney" "float sheen" 1 {TRIANGLE}
+        Shape "hyperboloid" {TRIANGLE}
         Shape "cone"
         Shape "nurbs"
         ObjectBegin "o" Shape "sphere" ObjectEnd

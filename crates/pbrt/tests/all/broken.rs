@@ -269,9 +269,9 @@ fn a_file_that_is_no_text_is_one_mistake() {
 
 #[test]
 fn kinds_that_are_not_supported_come_with_those_that_are() {
-    let text = "Camera \"environment\"\nWorldBegin\nMaterial \"hair\"\nShape \"cone\"\nWorldEnd";
+    let text = "Camera \"environment\"\nWorldBegin\nIdentity\nShape \"cone\"\nWorldEnd";
     let diagnostics = complaints(load_text(text));
-    for (line, words) in [(1, "perspective"), (3, "matte"), (4, "disk")] {
+    for (line, words) in [(1, "perspective"), (4, "disk")] {
         let help = diagnostics.iter().find(|d| d.line == line);
         let help = help.and_then(|d| d.help.as_deref()).unwrap_or_default();
         let is_good = help.starts_with("supported: ") && help.contains(words);
