@@ -9,7 +9,8 @@ use antumbra_scene::builtin;
 use crate::{Crop, MemorySize};
 
 /// The formats a scene may have.
-const KNOWN: &str = ".pbrt, .ply, .obj, .stl, .gltf, .glb, or builtin:NAME";
+const KNOWN: &str =
+    ".pbrt, .ply, .obj, .stl, .gltf, .glb, height rasters as .tif, .asc or .npy, or builtin:NAME";
 
 /// Why a scene was not loaded or cannot be used as asked.
 #[derive(Debug, thiserror::Error)]
@@ -53,6 +54,9 @@ pub enum Error {
     /// A mesh file that cannot be read. The text names file and place, and says `error` at every mistake.
     #[error(transparent)]
     Mesh(#[from] antumbra_mesh::Error),
+    /// A height raster that cannot be read. The text names the file, and says `error`.
+    #[error(transparent)]
+    Raster(#[from] antumbra_raster::Error),
     /// Warnings about a mesh file, where warnings are errors: see [`Options::strict`](crate::Options::strict).
     #[error("{}", as_errors(.0))]
     Strict(Vec<Warning>),
@@ -155,7 +159,10 @@ impl Error {
     pub fn names_places(&self) -> bool {
         matches!(
             self,
-            Self::Pbrt(antumbra_pbrt::Error::Scene(_)) | Self::Mesh(_) | Self::Strict(_)
+            Self::Pbrt(antumbra_pbrt::Error::Scene(_))
+                | Self::Mesh(_)
+                | Self::Raster(_)
+                | Self::Strict(_)
         )
     }
 }

@@ -7,6 +7,7 @@ use std::time::Instant;
 use antumbra::recipe::Order;
 use antumbra_mesh::{Warning, load_gltf, load_obj, load_stl, plain_material};
 use antumbra_pbrt::{Diagnostic, Times};
+use antumbra_raster::RasterCells;
 use antumbra_scene::{Geometry, Material, Param, Scene, Shape, Texture, TriangleMesh, builtin};
 
 use glam::DVec3;
@@ -16,6 +17,7 @@ use crate::estimate;
 use crate::extent::Extent;
 use crate::memory::MemorySize;
 use crate::stage::{self, OwnStage, Stage, Up};
+use crate::terrain;
 use crate::up::Upright;
 
 /// Marks the name of a built-in scene.
@@ -67,13 +69,15 @@ pub struct Loaded {
     pub up: Upright,
     /// The `.pbrt` files that the scene was read from, without links and dots; empty for other formats.
     pub files: Vec<PathBuf>,
+    /// Cells of a height raster, which are the vertices of its mesh; `None` for other files.
+    pub raster: Option<Arc<RasterCells>>,
     /// Every file that was read: scenes, meshes, images, spectra and buffers.
     pub inputs: Vec<PathBuf>,
 }
 
 impl Loaded {
     /// A scene that was not read from .pbrt files.
-    fn plain(scene: Scene) -> Self {
+    pub(crate) fn plain(scene: Scene) -> Self {
         Self {
             scene,
             seconds: 0.0,
@@ -85,6 +89,7 @@ impl Loaded {
             stage: None,
             up: Upright::DEFAULT,
             files: Vec::new(),
+            raster: None,
             inputs: Vec::new(),
         }
     }
@@ -184,7 +189,9 @@ fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> 
     let extension = extension(path);
     let mut loaded = match extension.as_str() {
         // The readers of other formats take files as they are.
-        "stl" | "obj" | "gltf" | "glb" if decompressed(path) != path => {
+        "stl" | "obj" | "gltf" | "glb" | "tif" | "tiff" | "asc" | "npy"
+            if decompressed(path) != path =>
+        {
             return Err(Error::Compressed {
                 path: path.to_path_buf(),
             });
@@ -196,6 +203,7 @@ fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> 
         "stl" => plain_mesh(path, load_stl(path, limit, origin)?),
         "obj" => of_model(path, load_obj(path, limit, origin)?),
         "gltf" | "glb" => of_model(path, load_gltf(path, limit, origin)?),
+        "tif" | "tiff" | "asc" | "npy" => terrain::load(path, stem(path), limit, origin)?,
         _ if path.is_dir() => {
             return Err(Error::Folder {
                 path: path.to_path_buf(),

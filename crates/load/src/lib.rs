@@ -1,6 +1,7 @@
 //! Scenes from whatever the user calls a scene.
 //!
-//! [`load`] takes a path (`.pbrt`, `.ply`, `.obj`, `.stl`, `.gltf`, `.glb`) or `builtin:NAME[:TRIANGLES]` and returns a
+//! [`load`] takes a path (`.pbrt`, `.ply`, `.obj`, `.stl`, `.gltf`, `.glb`), a height
+//! raster (`.tif`, `.asc`, `.npy`) or `builtin:NAME[:TRIANGLES]` and returns a
 //! [`Scene`](antumbra_scene::Scene):
 //!
 //! ```
@@ -17,6 +18,7 @@
 //! [`Loaded::warnings`]. Mistakes are in [`Error`]. All name file, line and column where there is one.
 //!
 //! - `file`: from a name to a scene, by its extension
+//! - `terrain`: height rasters as meshes
 //! - `stage`: camera, sun, sky and ground for meshes that come alone;  `clear_sky`: that sky
 //! - `extent`, `up`: where a scene lies, and which way it stands
 //! - `adjust`, `crop`: what a caller may choose instead of the scene: camera, film, integrator, samples
@@ -33,6 +35,7 @@ mod extent;
 mod file;
 mod memory;
 mod stage;
+mod terrain;
 mod up;
 
 pub use adjust::{
@@ -41,6 +44,7 @@ pub use adjust::{
 };
 pub use antumbra_mesh::Warning;
 pub use antumbra_pbrt::{Diagnostic, Severity};
+pub use antumbra_raster::RasterCells;
 pub use crop::Crop;
 pub use error::Error;
 pub use estimate::check_picture;

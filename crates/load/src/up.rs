@@ -41,6 +41,9 @@ impl Upright {
         if matches!(extension.as_str(), "gltf" | "glb") {
             return found(Up::Y, "as glTF has it");
         }
+        if matches!(extension.as_str(), "tif" | "tiff" | "asc" | "npy") {
+            return found(Up::Z, "as rasters of heights have it");
+        }
         if has_camera {
             return found(of_camera(scene), "as its camera has it");
         }

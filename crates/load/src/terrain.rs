@@ -1,0 +1,110 @@
+//! Height rasters as meshes.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use antumbra_mesh::{Warning, plain_material};
+use antumbra_raster::{Grid, companions, read};
+use antumbra_scene::TriangleMesh;
+use glam::DVec3;
+
+use crate::Error;
+use crate::file::Loaded;
+use crate::stage::{OwnStage, scene_of_mesh};
+
+/// Reads a raster as the surface between the centres of its cells, measured from `origin`, within `limit` bytes.
+pub fn load(path: &Path, name: String, limit: u64, origin: DVec3) -> Result<Loaded, Error> {
+    let raster = read(path, limit)?;
+    let warnings = warnings(path, &raster.grid);
+    let surface = raster.mesh(origin.to_array());
+    let cells = raster.into_cells(&surface);
+    let mesh = TriangleMesh {
+        positions: surface.positions,
+        indices: surface.indices,
+        normals: surface.normals.into_iter().map(Into::into).collect(),
+        uvs: Vec::new(),
+        colors: Vec::new(),
+    };
+    Ok(Loaded {
+        stage: Some(OwnStage::default()),
+        warnings,
+        raster: Some(Arc::new(cells)),
+        inputs: companions(path),
+        ..Loaded::plain(scene_of_mesh(name, mesh, plain_material()))
+    })
+}
+
+/// What speaks against the raster being in one unit of length.
+fn warnings(path: &Path, grid: &Grid) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let mut warn = |text: String| {
+        let place = path.display().to_string();
+        warnings.push(Warning { place, text });
+    };
+    if grid.may_be_degrees() {
+        let cell = grid.transform[1];
+        warn(format!(
+            "cells of {cell} on coordinates that are on the globe look like degrees; sizes must be in the unit of the heights"
+        ));
+    }
+    if let Some([ground, height]) = grid.crs.as_ref().and_then(|crs| crs.odd_units()) {
+        let unit = |code: u16| match code {
+            9001 => "metres".to_owned(),
+            9002 => "feet".to_owned(),
+            9003 => "US survey feet".to_owned(),
+            code => format!("EPSG:{code}"),
+        };
+        warn(format!(
+            "coordinates are in {}, and heights in {} as far as the file says; they are taken as one unit",
+            unit(ground),
+            unit(height)
+        ));
+    }
+    warnings
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use antumbra_scene::Geometry;
+
+    use crate::{Extent, Options, Up, load};
+
+    #[test]
+    fn rasters_are_meshes_in_double_precision() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("hill.asc");
+        let head = "ncols 3\nnrows 2\nxllcorner 600000.25\nyllcorner 5340000\ncellsize 0.5\n";
+        fs::write(&path, format!("{head}1 2 3\n4 5 6\n")).expect("a file");
+        let loaded = load(&path, &Options::default()).expect("a scene");
+        assert_eq!(loaded.up.axis, Up::Z);
+        let Geometry::Mesh(mesh) = &loaded.scene.shapes[0].geometry else {
+            panic!("no mesh");
+        };
+        let world = glam::DVec3::from(glam::Vec3::from(mesh.positions[0])) + loaded.scene.origin;
+        assert_eq!(world.to_array(), [600_000.5, 5_340_000.75, 1.0]);
+        assert_eq!(mesh.indices.len(), 4);
+        let cells = loaded.raster.expect("cells");
+        assert_eq!(cells.cells, [0, 1, 2, 3, 4, 5]);
+        assert!(Extent::of(&loaded.scene).is_some() && loaded.warnings.is_empty());
+    }
+
+    #[test]
+    fn degrees_are_refused_or_warned_of() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("hill.asc");
+        let head = "ncols 2\nnrows 2\nxllcorner 11\nyllcorner 48\ncellsize 0.001\n";
+        fs::write(&path, format!("{head}1 2\n3 4\n")).expect("a file");
+        let loaded = load(&path, &Options::default()).expect("a scene");
+        assert!(loaded.warnings[0].text.contains("degrees"));
+        let strict = Options {
+            strict: true,
+            ..Options::default()
+        };
+        assert!(load(&path, &strict).is_err());
+        fs::write(path.with_extension("prj"), "GEOGCS[\"WGS 84\"]").expect("a file");
+        let error = load(&path, &Options::default()).expect_err("degrees");
+        assert!(error.to_string().contains("gdalwarp"), "{error}");
+    }
+}

@@ -1,0 +1,288 @@
+//! GeoTIFF: the crate `tiff` reads and writes the pixels, tags of places are ours (OGC 19-008r4, GeoTIFF 1.1).
+
+use std::io::Cursor;
+
+use tiff::ColorType;
+use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::encoder::colortype::Gray32Float;
+use tiff::encoder::compression::DeflateLevel;
+use tiff::encoder::{Compression, TiffEncoder};
+use tiff::tags::Tag;
+
+use crate::grid::check_transform;
+use crate::{Crs, Grid, Memory, Quantity, Raster};
+
+/// Notes of GDAL as XML: scale and offset of values, their names and units.
+const GDAL_METADATA: u16 = 42_112;
+
+/// Reads a file of one band. `world_file` says where the cells are if the file does not.
+pub fn read(
+    bytes: &[u8],
+    world_file: &dyn Fn() -> Result<Option<[f64; 6]>, String>,
+    check: impl Fn([usize; 2]) -> Result<(), String>,
+) -> Result<Raster, String> {
+    let text = |error: tiff::TiffError| error.to_string();
+    let decoder = Decoder::new(Cursor::new(bytes)).map_err(text)?;
+    // Sizes are checked before the pixels are read.
+    let mut limits = Limits::unlimited();
+    limits.ifd_value_size = bytes.len();
+    let mut decoder = decoder.with_limits(limits);
+    let (width, height) = decoder.dimensions().map_err(text)?;
+    let size = [width as usize, height as usize];
+    check(size)?;
+    match decoder.colortype().map_err(text)? {
+        ColorType::Gray(8 | 16 | 32 | 64) => {}
+        other => {
+            return Err(format!(
+                "found pixels of {other:?}, wanted one band of numbers"
+            ));
+        }
+    }
+    let crs = crs(&mut decoder);
+    let transform = match transform(&mut decoder, crs.as_ref())? {
+        Some(transform) => transform,
+        None => world_file()?.ok_or(
+            "it says nowhere where it is; wanted tags of GeoTIFF, or a world file of the same name with the extension .tfw",
+        )?,
+    };
+    let no_data: Option<f64> =
+        string(&mut decoder, Tag::GdalNodata).and_then(|text| text.trim().parse().ok());
+    let notes = string(&mut decoder, Tag::Unknown(GDAL_METADATA)).unwrap_or_default();
+    let [scale, offset] = scale_and_offset(&notes)?;
+    let pixels = decoder.read_image().map_err(text)?;
+    let mut values = numbers(pixels);
+    if values.len() != size[0] * size[1] {
+        let found = values.len();
+        return Err(format!("found {found} pixels, wanted {width} x {height}"));
+    }
+    for value in &mut values {
+        // Marks are written with fewer digits than the pixels have.
+        let is_mark = |mark: f64| *value == mark || *value as f32 == mark as f32;
+        let is_data = value.is_finite() && !no_data.is_some_and(is_mark);
+        *value = if is_data {
+            scale * *value + offset
+        } else {
+            f64::NAN
+        };
+    }
+    Ok(Raster {
+        grid: Grid {
+            width: size[0],
+            height: size[1],
+            transform: check_transform(transform)?,
+            crs,
+        },
+        values,
+    })
+}
+
+/// Decoder of bytes in memory.
+type Bytes<'a> = Decoder<Memory<&'a [u8]>>;
+
+fn string(decoder: &mut Bytes<'_>, tag: Tag) -> Option<String> {
+    let text = decoder.get_tag_ascii_string(tag).ok()?;
+    Some(text.trim_end_matches('\0').to_owned())
+}
+
+fn doubles(decoder: &mut Bytes<'_>, tag: Tag) -> Option<Vec<f64>> {
+    decoder.get_tag_f64_vec(tag).ok()
+}
+
+fn crs(decoder: &mut Bytes<'_>) -> Option<Crs> {
+    let directory = decoder.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).ok()?;
+    Some(Crs {
+        directory,
+        doubles: doubles(decoder, Tag::GeoDoubleParamsTag).unwrap_or_default(),
+        names: string(decoder, Tag::GeoAsciiParamsTag).unwrap_or_default(),
+    })
+}
+
+/// Where the cells are; `None` if the file does not say.
+fn transform(decoder: &mut Bytes<'_>, crs: Option<&Crs>) -> Result<Option<[f64; 6]>, String> {
+    let matrix = doubles(decoder, Tag::ModelTransformationTag);
+    let ties = doubles(decoder, Tag::ModelTiepointTag);
+    let scale = doubles(decoder, Tag::ModelPixelScaleTag);
+    let [x, a, b, y, d, e] = match (matrix.as_deref(), ties.as_deref(), scale.as_deref()) {
+        (Some(&[a, b, _, x, d, e, _, y, ..]), ..) => [x, a, b, y, d, e],
+        (None, Some(&[column, row, _, x, y, _]), Some(&[width, height, ..])) => [
+            x - column * width,
+            width,
+            0.0,
+            y + row * height,
+            0.0,
+            -height,
+        ],
+        (None, None, None) => return Ok(None),
+        _ => {
+            let reason = "its place is given by points only; resample it first, as with gdalwarp";
+            return Err(reason.into());
+        }
+    };
+    // Of points, the first cell's centre is where the tags say.
+    Ok(Some(match crs.is_some_and(Crs::is_point) {
+        true => [x - 0.5 * (a + b), a, b, y - 0.5 * (d + e), d, e],
+        false => [x, a, b, y, d, e],
+    }))
+}
+
+/// Scale and offset of values in the notes of GDAL.
+fn scale_and_offset(notes: &str) -> Result<[f64; 2], String> {
+    let item = |role: &str, default: f64| {
+        let found = notes.split_once(&format!("role=\"{role}\""));
+        let text = found.and_then(|(_, rest)| rest.split_once('>'));
+        let text = text.and_then(|(_, rest)| rest.split_once('<'));
+        let Some((text, _)) = text else {
+            return Ok(default);
+        };
+        let number = text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+        number.ok_or_else(|| format!("{role}: found `{text}`, wanted a number"))
+    };
+    Ok([item("scale", 1.0)?, item("offset", 0.0)?])
+}
+
+fn numbers(pixels: DecodingResult) -> Vec<f64> {
+    fn all<T: Into<f64>>(list: Vec<T>) -> Vec<f64> {
+        list.into_iter().map(Into::into).collect()
+    }
+    match pixels {
+        DecodingResult::U8(list) => all(list),
+        DecodingResult::U16(list) => all(list),
+        DecodingResult::U32(list) => all(list),
+        DecodingResult::U64(list) => list.into_iter().map(|x| x as f64).collect(),
+        DecodingResult::I8(list) => all(list),
+        DecodingResult::I16(list) => all(list),
+        DecodingResult::I32(list) => all(list),
+        DecodingResult::I64(list) => list.into_iter().map(|x| x as f64).collect(),
+        DecodingResult::F16(list) => list.into_iter().map(|x| x.to_f64()).collect(),
+        DecodingResult::F32(list) => all(list),
+        DecodingResult::F64(list) => list,
+    }
+}
+
+/// Writes one band.
+pub fn write(grid: &Grid, values: &[f32], quantity: Quantity<'_>) -> Result<Vec<u8>, String> {
+    let mut bytes = Cursor::new(Vec::new());
+    encode(&mut bytes, grid, values, quantity).map_err(|error| error.to_string())?;
+    Ok(bytes.into_inner())
+}
+
+fn encode(
+    bytes: &mut Memory<Vec<u8>>,
+    grid: &Grid,
+    values: &[f32],
+    Quantity { name, unit }: Quantity<'_>,
+) -> tiff::TiffResult<()> {
+    let deflate = Compression::Deflate(DeflateLevel::Balanced);
+    let mut encoder = TiffEncoder::new(bytes)?.with_compression(deflate);
+    let mut image = encoder.new_image::<Gray32Float>(grid.width as u32, grid.height as u32)?;
+    let [x, a, b, y, d, e] = grid.transform;
+    let is_point = grid.crs.as_ref().is_some_and(Crs::is_point);
+    let [x, y] = match is_point {
+        true => [x + 0.5 * (a + b), y + 0.5 * (d + e)],
+        false => [x, y],
+    };
+    let tags = image.encoder();
+    if a > 0.0 && e < 0.0 && b == 0.0 && d == 0.0 {
+        tags.write_tag(Tag::ModelPixelScaleTag, &[a, -e, 0.0][..])?;
+        tags.write_tag(Tag::ModelTiepointTag, &[0.0, 0.0, 0.0, x, y, 0.0][..])?;
+    } else {
+        let matrix = [
+            [a, b, 0.0, x],
+            [d, e, 0.0, y],
+            [0.0; 4],
+            [0.0, 0.0, 0.0, 1.0],
+        ];
+        tags.write_tag(Tag::ModelTransformationTag, matrix.as_flattened())?;
+    }
+    if let Some(crs) = &grid.crs {
+        tags.write_tag(Tag::GeoKeyDirectoryTag, &crs.directory[..])?;
+        if !crs.doubles.is_empty() {
+            tags.write_tag(Tag::GeoDoubleParamsTag, &crs.doubles[..])?;
+        }
+        if !crs.names.is_empty() {
+            tags.write_tag(Tag::GeoAsciiParamsTag, &crs.names[..])?;
+        }
+    }
+    let mut notes = format!(
+        "<GDALMetadata>\n<Item name=\"DESCRIPTION\" sample=\"0\" role=\"description\">{name}</Item>\n"
+    );
+    if !unit.is_empty() {
+        notes += &format!("<Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">{unit}</Item>\n");
+    }
+    notes += "</GDALMetadata>";
+    tags.write_tag(Tag::Unknown(GDAL_METADATA), &notes[..])?;
+    tags.write_tag(Tag::GdalNodata, "nan")?;
+    image.write_data(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HOURS: Quantity<'_> = Quantity {
+        name: "hours",
+        unit: "h",
+    };
+
+    #[test]
+    fn rasters_come_back_where_they_were() {
+        let values = [1.0, 2.5, f32::NAN, 4.0, 5.0, 6.0];
+        let point_keys = [1, 1, 0, 3, 1024, 0, 1, 1, 1025, 0, 1, 2, 3072, 0, 1, 25_832];
+        let point = Crs {
+            directory: point_keys.to_vec(),
+            doubles: vec![1.5],
+            names: "a name|".into(),
+        };
+        let systems = [
+            None,
+            Some(Crs::from_epsg(25_832).expect("a code")),
+            Some(point),
+        ];
+        for crs in systems {
+            for transform in [
+                [600_000.0, 10.0, 0.0, 5_340_000.0, 0.0, -10.0],
+                [600_000.0, 10.0, 0.0, 5_340_000.0, 0.0, 5.0],
+                [600_000.0, 7.0, 3.0, 5_340_000.0, 3.0, -7.0],
+            ] {
+                let grid = Grid {
+                    width: 3,
+                    height: 2,
+                    transform,
+                    crs: crs.clone(),
+                };
+                let bytes = write(&grid, &values, HOURS).expect("a file");
+                let raster = Raster::from_geotiff(&bytes).expect("a raster");
+                assert_eq!(raster.grid, grid);
+                assert!(raster.values[2].is_nan());
+                assert_eq!(raster.values[1], 2.5);
+            }
+        }
+    }
+
+    #[test]
+    fn notes_of_gdal_scale_values() {
+        let notes = "<Item name=\"OFFSET\" sample=\"0\" role=\"offset\">100</Item>\n\
+                     <Item name=\"SCALE\" sample=\"0\" role=\"scale\">0.01</Item>";
+        assert_eq!(scale_and_offset(notes), Ok([0.01, 100.0]));
+        assert_eq!(scale_and_offset(""), Ok([1.0, 0.0]));
+        assert!(scale_and_offset("role=\"scale\">two<").is_err());
+    }
+
+    #[test]
+    fn files_without_a_place_and_damaged_ones_are_refused() {
+        let grid = Grid::north_up([2, 2], [0.0; 2], 1.0);
+        let bytes = write(&grid, &[0.0; 4], HOURS).expect("a file");
+        for cut in 0..bytes.len() {
+            let _ = Raster::from_geotiff(&bytes[..cut]);
+        }
+        let mut plain = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut plain).expect("an encoder");
+        encoder
+            .write_image::<Gray32Float>(2, 2, &[0.0; 4])
+            .expect("a picture");
+        let error = Raster::from_geotiff(plain.get_ref()).expect_err("no place");
+        assert!(error.contains(".tfw"), "{error}");
+        let placed = read(plain.get_ref(), &|| Ok(Some(grid.transform)), |_| Ok(()));
+        assert_eq!(placed.expect("a raster").grid, grid);
+    }
+}

@@ -1,0 +1,253 @@
+//! Height rasters as triangle meshes, and rasters of results with the same georeference.
+//!
+//! A digital elevation model (DEM) has a height in every cell. [`read`] reads a GeoTIFF, an ESRI ASCII grid (`.asc`) or a
+//! `.npy` with a world file. [`Raster::mesh`] joins the centres of the cells to triangles. [`write`](fn@write) writes values of
+//! the same cells, where the input was.
+//!
+//! ```
+//! use antumbra_raster::{Grid, Raster};
+//!
+//! let text = "ncols 2\nnrows 2\nxllcorner 600000\nyllcorner 5340000\ncellsize 10\n1 2\n3 4\n";
+//! let raster = Raster::from_asc(text)?;
+//! let mesh = raster.mesh([600_000.0, 5_340_000.0, 0.0]);
+//! assert_eq!(mesh.positions[0], [5.0, 15.0, 1.0], "the first cell is in the north west");
+//! assert_eq!(mesh.indices.len(), 2);
+//! # Ok::<(), String>(())
+//! ```
+//!
+//! - `grid`: where the cells are;  `mesh`: cells as triangles
+//! - `geotiff`, `asc`, `npy`: one format each;  `crs`: coordinate systems as GeoTIFF describes them
+#![forbid(unsafe_code)]
+
+mod asc;
+mod crs;
+mod geotiff;
+mod grid;
+mod mesh;
+mod npy;
+
+use std::fs::{self, File};
+use std::io::{self, Cursor, Read};
+use std::path::{Path, PathBuf};
+
+pub use crs::Crs;
+pub use grid::{Grid, RasterCells};
+pub use mesh::RasterMesh;
+
+/// Extensions of files that [`read`] reads.
+pub const EXTENSIONS: [&str; 4] = ["tif", "tiff", "asc", "npy"];
+
+/// Reason why a raster was not read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The file cannot be read, is not a regular file, or is larger than the memory allowed.
+    #[error("error: {}: {source}", path.display())]
+    Io {
+        /// Path of the file.
+        path: PathBuf,
+        /// Error of the operating system, or the reason for the refusal.
+        source: io::Error,
+    },
+    /// The contents of the file are wrong, or of a kind that is not read.
+    #[error("{}: error: {reason}", path.display())]
+    Broken {
+        /// Path of the file.
+        path: PathBuf,
+        /// What is wrong.
+        reason: String,
+    },
+    /// Values cannot be written in the format.
+    #[error("{}: {reason}", path.display())]
+    Unwritable {
+        /// Path of the file.
+        path: PathBuf,
+        /// Why not.
+        reason: String,
+    },
+}
+
+/// A raster of one value in each cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Raster {
+    /// Where the cells are.
+    pub grid: Grid,
+    /// Values, `[height, width]`, the first row first. NaN where the file has no data.
+    pub values: Vec<f64>,
+}
+
+/// Bytes of memory for each cell of a raster as a mesh: its value, vertex, normal and two triangles.
+const PER_CELL: u64 = 8 + 12 + 12 + 24 + 8;
+
+/// Reads a raster by its extension, within `max_bytes` of memory for the file, its values and its mesh.
+///
+/// | format | values | georeference |
+/// |---|---|---|
+/// | `.tif`, `.tiff` | one band of numbers; the nodata value, scale and offset that GDAL notes | tags of GeoTIFF, or a world file (`.tfw` or `.wld`) |
+/// | `.asc` | numbers, `NODATA_value` | header |
+/// | `.npy` | two dimensions of numbers; NaN is no data | a world file (`.wld`) |
+///
+/// A `.prj` file beside an `.asc`, a `.npy` or a plain `.tif` says whether its coordinates are degrees.
+///
+/// # Errors
+/// [`Error::Io`], or [`Error::Broken`] with the reason. Rasters in degrees are refused: their cells have no length.
+pub fn read(path: &Path, max_bytes: u64) -> Result<Raster, Error> {
+    let broken = |reason: String| Error::Broken {
+        path: path.to_path_buf(),
+        reason,
+    };
+    let bytes = read_file(path, max_bytes)?;
+    let room = (max_bytes - bytes.len() as u64) / PER_CELL;
+    let check = |[width, height]: [usize; 2]| grid::check_size([width, height], room);
+    let mut raster = match extension(path).as_str() {
+        "tif" | "tiff" => geotiff::read(&bytes, &|| world_file(path, &["tfw", "wld"]), check),
+        "asc" => asc::read(&bytes, check),
+        "npy" => npy::read(&bytes, &|| world_file(path, &["wld"]), check),
+        other => Err(format!("`{other}` is no extension of a raster")),
+    }
+    .map_err(broken)?;
+    if raster.grid.crs.is_none() && has_geographic_prj(path) {
+        raster.grid.crs = Some(Crs::degrees());
+    }
+    if raster.grid.crs.as_ref().is_some_and(Crs::is_geographic) {
+        let reason = "its coordinates are degrees, in which cells have no length; project it to metres first, as with \
+                      gdalwarp -t_srs EPSG:32632";
+        return Err(broken(reason.into()));
+    }
+    Ok(raster)
+}
+
+/// Files beside a raster that [`read`] looks at, if they exist.
+pub fn companions(path: &Path) -> Vec<PathBuf> {
+    let beside = ["tfw", "wld", "prj"].map(|extension| path.with_extension(extension));
+    beside.into_iter().filter(|path| path.is_file()).collect()
+}
+
+/// A named quantity with its unit, as a file describes it.
+#[derive(Clone, Copy, Debug)]
+pub struct Quantity<'a> {
+    /// Name, such as `hours`.
+    pub name: &'a str,
+    /// Unit, such as `h`; empty if it has none.
+    pub unit: &'a str,
+}
+
+/// Values of the cells of a grid as the bytes of a file; NaN is no data.
+///
+/// | format | holds |
+/// |---|---|
+/// | `.tif`, `.tiff` | one band of 32-bit floats, deflated, with the georeference, name and unit |
+/// | `.asc` | an ESRI ASCII grid; cells must be squares with rows from north to south |
+/// | `.npy` | `[height, width]` of 32-bit floats, without a georeference |
+///
+/// # Errors
+/// [`Error::Unwritable`] if the format cannot hold the grid.
+///
+/// # Panics
+/// If there are not as many values as cells.
+pub fn write(
+    path: &Path,
+    grid: &Grid,
+    values: &[f32],
+    quantity: Quantity<'_>,
+) -> Result<Vec<u8>, Error> {
+    assert_eq!(values.len(), grid.width * grid.height, "one value per cell");
+    let written = match extension(path).as_str() {
+        "tif" | "tiff" => geotiff::write(grid, values, quantity),
+        "asc" => asc::write(grid, values),
+        "npy" => Ok(npy::write(grid, values)),
+        other => Err(format!("`{other}` is no extension of a raster")),
+    };
+    written.map_err(|reason| Error::Unwritable {
+        path: path.to_path_buf(),
+        reason,
+    })
+}
+
+impl Raster {
+    /// Reads the text of an ESRI ASCII grid.
+    ///
+    /// # Errors
+    /// What is wrong, with its line.
+    pub fn from_asc(text: &str) -> Result<Self, String> {
+        asc::read(text.as_bytes(), |_| Ok(()))
+    }
+
+    /// Reads the bytes of a GeoTIFF.
+    ///
+    /// # Errors
+    /// What is wrong.
+    pub fn from_geotiff(bytes: &[u8]) -> Result<Self, String> {
+        geotiff::read(bytes, &|| Ok(None), |_| Ok(()))
+    }
+}
+
+/// Extension in small letters.
+fn extension(path: &Path) -> String {
+    let extension = path.extension().unwrap_or_default();
+    extension.to_string_lossy().to_ascii_lowercase()
+}
+
+/// Reads a regular file of at most so many bytes.
+fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
+    let io = |source| Error::Io {
+        path: path.to_path_buf(),
+        source,
+    };
+    let refused = |message: String| io(io::Error::new(io::ErrorKind::InvalidInput, message));
+    // Checked before opening, because opening a pipe waits for its writer.
+    let about = fs::metadata(path).map_err(io)?;
+    if !about.is_file() {
+        return Err(refused("not a regular file".into()));
+    }
+    let length = about.len();
+    if length > limit {
+        return Err(refused(format!(
+            "the file has {length} bytes, but only {limit} bytes of memory are allowed"
+        )));
+    }
+    let mut bytes = Vec::new();
+    let room = bytes.try_reserve_exact(length as usize);
+    room.map_err(|error| refused(error.to_string()))?;
+    let file = File::open(path).map_err(io)?;
+    file.take(length).read_to_end(&mut bytes).map_err(io)?;
+    Ok(bytes)
+}
+
+/// Most bytes of a world file or of a description of a coordinate system.
+const SMALL: u64 = 1 << 16;
+
+/// Transform of the world file beside a raster.
+fn world_file(path: &Path, extensions: &[&str]) -> Result<Option<[f64; 6]>, String> {
+    for extension in extensions {
+        let beside = path.with_extension(extension);
+        if beside.is_file() {
+            let bytes = read_file(&beside, SMALL).map_err(|error| error.to_string())?;
+            let text = String::from_utf8_lossy(&bytes);
+            let found = grid::world_file(&text);
+            let place = |reason| format!("{}: {reason}", beside.display());
+            return found.map(Some).map_err(place);
+        }
+    }
+    Ok(None)
+}
+
+/// Whether a .prj file beside a raster describes degrees.
+fn has_geographic_prj(path: &Path) -> bool {
+    let Ok(bytes) = read_file(&path.with_extension("prj"), SMALL) else {
+        return false;
+    };
+    let text = String::from_utf8_lossy(&bytes).trim().to_ascii_uppercase();
+    [
+        "GEOGCS",
+        "GEOGCRS",
+        "GEODCRS",
+        "GEODETICCRS",
+        "GEOGRAPHICCRS",
+    ]
+    .iter()
+    .any(|start| text.starts_with(start))
+}
+
+/// Bytes in memory as a file that can be read and written anywhere.
+type Memory<T> = Cursor<T>;

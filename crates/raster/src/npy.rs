@@ -1,0 +1,209 @@
+//! Arrays of numpy (.npy), version 1 to 3 of the format.
+
+use std::io::Write as _;
+
+use crate::grid::check_transform;
+use crate::{Grid, Raster};
+
+const MAGIC: &[u8] = b"\x93NUMPY";
+
+/// What says where the cells of an array are.
+type WorldFile<'a> = &'a dyn Fn() -> Result<Option<[f64; 6]>, String>;
+
+/// Reads an array of two dimensions, whose place is in a world file.
+pub fn read(
+    bytes: &[u8],
+    world_file: WorldFile<'_>,
+    check: impl Fn([usize; 2]) -> Result<(), String>,
+) -> Result<Raster, String> {
+    let not_npy = || "it is no .npy file".to_owned();
+    let rest = bytes.strip_prefix(MAGIC).ok_or_else(not_npy)?;
+    let &[major, _minor, ref rest @ ..] = rest else {
+        return Err(not_npy());
+    };
+    let (length, rest) = match major {
+        1 => {
+            let (length, rest) = rest.split_first_chunk::<2>().ok_or_else(not_npy)?;
+            (u16::from_le_bytes(*length) as usize, rest)
+        }
+        2 | 3 => {
+            let (length, rest) = rest.split_first_chunk::<4>().ok_or_else(not_npy)?;
+            (u32::from_le_bytes(*length) as usize, rest)
+        }
+        _ => return Err(format!("version {major} of .npy is not known")),
+    };
+    let (head, data) = rest.split_at_checked(length).ok_or_else(not_npy)?;
+    let head = String::from_utf8_lossy(head);
+    let [height, width] = shape(&head)?;
+    check([width, height])?;
+    let is_fortran = field(&head, "fortran_order").is_some_and(|text| text.starts_with("True"));
+    let kind = field(&head, "descr").unwrap_or_default();
+    let kind = kind.trim_start_matches(['\'', '"']);
+    let kind: String = kind.chars().take_while(|c| !"'\"".contains(*c)).collect();
+    let numbers = numbers(&kind, data, width * height)?;
+    let at = |index: usize| match is_fortran {
+        true => numbers[index % width * height + index / width],
+        false => numbers[index],
+    };
+    let values = (0..width * height).map(at);
+    let values = values
+        .map(|value| if value.is_finite() { value } else { f64::NAN })
+        .collect();
+    let transform = world_file()?.ok_or(
+        "an .npy has no place; add a world file of the same name with the extension .wld, of six lines: cell width, 0, 0, \
+         minus cell height, x and y of the centre of the first cell",
+    )?;
+    Ok(Raster {
+        grid: Grid {
+            width,
+            height,
+            transform: check_transform(transform)?,
+            crs: None,
+        },
+        values,
+    })
+}
+
+/// Text after a key of the header.
+fn field<'a>(head: &'a str, key: &str) -> Option<&'a str> {
+    let quoted = [format!("'{key}'"), format!("\"{key}\"")];
+    let (_, rest) = quoted
+        .iter()
+        .find_map(|key| head.split_once(key.as_str()))?;
+    Some(rest.trim_start().strip_prefix(':')?.trim_start())
+}
+
+/// Rows and columns.
+fn shape(head: &str) -> Result<[usize; 2], String> {
+    let text = field(head, "shape").and_then(|text| text.strip_prefix('('));
+    let text = text
+        .and_then(|text| text.split_once(')'))
+        .map(|(text, _)| text);
+    let text = text.ok_or("its header has no shape")?;
+    let sizes: Option<Vec<usize>> = (text.split(',').map(str::trim))
+        .filter(|size| !size.is_empty())
+        .map(|size| size.parse().ok())
+        .collect();
+    match sizes.as_deref() {
+        Some(&[height, width]) => Ok([height, width]),
+        _ => Err(format!("found the shape ({text}), wanted two dimensions")),
+    }
+}
+
+/// So many numbers of a kind, such as `<f4`.
+fn numbers(kind: &str, data: &[u8], count: usize) -> Result<Vec<f64>, String> {
+    let unknown = || format!("found numbers `{kind}`, wanted f4, f8, i1 to i8 or u1 to u8");
+    let (order, letter) = kind.split_at_checked(1).ok_or_else(unknown)?;
+    let is_big = match order {
+        "<" | "|" | "=" => false,
+        ">" => true,
+        _ => return Err(unknown()),
+    };
+    macro_rules! as_numbers {
+        ($type:ty) => {{
+            const SIZE: usize = size_of::<$type>();
+            let (chunks, rest) = data.as_chunks::<SIZE>();
+            if chunks.len() != count || !rest.is_empty() {
+                let (found, wanted) = (data.len(), count * SIZE);
+                return Err(format!("found {found} bytes of numbers, wanted {wanted}"));
+            }
+            let number = |bytes: &[u8; SIZE]| match is_big {
+                true => <$type>::from_be_bytes(*bytes) as f64,
+                false => <$type>::from_le_bytes(*bytes) as f64,
+            };
+            Ok(chunks.iter().map(number).collect())
+        }};
+    }
+    match letter {
+        "f4" => as_numbers!(f32),
+        "f8" => as_numbers!(f64),
+        "i1" => as_numbers!(i8),
+        "i2" => as_numbers!(i16),
+        "i4" => as_numbers!(i32),
+        "i8" => as_numbers!(i64),
+        "u1" => as_numbers!(u8),
+        "u2" => as_numbers!(u16),
+        "u4" => as_numbers!(u32),
+        "u8" => as_numbers!(u64),
+        _ => Err(unknown()),
+    }
+}
+
+/// Writes an array of 32-bit floats.
+pub fn write(grid: &Grid, values: &[f32]) -> Vec<u8> {
+    let (height, width) = (grid.height, grid.width);
+    let mut head =
+        format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({height}, {width}), }}");
+    // Data begin at a multiple of 64 bytes, and the header ends with a line.
+    let before = MAGIC.len() + 4;
+    let padding = (64 - (before + head.len() + 1) % 64) % 64;
+    head.extend(std::iter::repeat_n(' ', padding));
+    head.push('\n');
+    let mut bytes = Vec::with_capacity(before + head.len() + 4 * values.len());
+    bytes.extend(MAGIC);
+    bytes.extend([1, 0]);
+    bytes.extend((head.len() as u16).to_le_bytes());
+    // Never fails in memory.
+    let _ = bytes.write_all(head.as_bytes());
+    bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLACE: [f64; 6] = [0.0, 1.0, 0.0, 2.0, 0.0, -1.0];
+
+    fn array(descr: &str, order: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+        let head =
+            format!("{{'descr': '{descr}', 'fortran_order': {order}, 'shape': {shape}, }}\n");
+        let mut bytes = [MAGIC, &[1, 0]].concat();
+        bytes.extend((head.len() as u16).to_le_bytes());
+        bytes.extend(head.as_bytes());
+        bytes.extend(data);
+        bytes
+    }
+
+    #[test]
+    fn arrays_come_back_in_any_order() {
+        let place: WorldFile<'_> = &|| Ok(Some(PLACE));
+        let values = [1.0, 2.0, f32::NAN, 4.0, 5.0, 6.0];
+        let grid = Grid::north_up([3, 2], [0.0, 2.0], 1.0);
+        let raster = read(&write(&grid, &values), place, |_| Ok(())).expect("a raster");
+        assert_eq!(raster.grid, grid);
+        assert_eq!((raster.values[1], raster.values[5]), (2.0, 6.0));
+        assert!(raster.values[2].is_nan());
+        let big: Vec<u8> = [1_i16, 4, 2, 5, 3, 6]
+            .iter()
+            .flat_map(|x| x.to_be_bytes())
+            .collect();
+        let turned = array(">i2", "True", "(2, 3)", &big);
+        let turned = read(&turned, place, |_| Ok(())).expect("a raster");
+        assert_eq!(turned.values, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    }
+
+    #[test]
+    fn arrays_that_are_no_rasters_are_refused() {
+        let place: WorldFile<'_> = &|| Ok(Some(PLACE));
+        for (bytes, word) in [
+            (array("<f4", "False", "(2, 3)", &[0; 20]), "found 20 bytes"),
+            (array("<f4", "False", "(6,)", &[0; 24]), "two dimensions"),
+            (
+                array("<c8", "False", "(2, 2)", &[0; 32]),
+                "found numbers `<c8`",
+            ),
+            (b"\x93NUMPY\x01".to_vec(), "no .npy"),
+            (
+                array("<f4", "False", "(2, 2)", &[0; 16])[..20].to_vec(),
+                "no .npy",
+            ),
+        ] {
+            let error = read(&bytes, place, |_| Ok(())).expect_err(word);
+            assert!(error.contains(word), "{error}");
+        }
+        let whole = array("<f4", "False", "(2, 2)", &[0; 16]);
+        let error = read(&whole, &|| Ok(None), |_| Ok(())).expect_err("no place");
+        assert!(error.contains(".wld"), "{error}");
+    }
+}
