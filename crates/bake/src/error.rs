@@ -59,6 +59,15 @@ pub enum Error {
     /// No cell of a grid has a surface.
     #[error("no surface is seen from above")]
     NothingBelow,
+    /// No surface is below a point without a height.
+    #[error("no surface is above or below point {}", index + 1)]
+    OffSurface {
+        /// Number of the point, from 0.
+        index: usize,
+    },
+    /// No sensor is on the surfaces or lines that were chosen.
+    #[error("no surface or line that was chosen has a place for a sensor; a smaller spacing may")]
+    NoSurface,
     /// A texture is made of no triangle.
     #[error("no triangle has texture coordinates")]
     NoTextureCoordinates,

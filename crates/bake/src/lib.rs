@@ -25,6 +25,7 @@
 //! | where does the sun stand | [`sun_positions`], [`Orientation::direction`] | angles, a direction in the scene |
 //! | which suns does each point see, and for how long | [`sees_directions`], [`sun_hours`] | [`BitMatrix`], points x suns; `f64` |
 //! | how much energy does each point receive from the sun and the sky | [`SunJob`], [`run`] | [`SunValues`] |
+//! | how much of the light of a surface arrives at others | [`view_factors`] | `f64`, surfaces x surfaces |
 //! | which points see each other | [`sees_points`], [`sees_each_other`] | [`BitMatrix`], points x points |
 //!
 //! All of them take slices of `[f32; 3]` in the coordinates of the tree, and a [`Monitor`], which hears of the progress and may
@@ -65,9 +66,13 @@
 //! - `job`: jobs and their keys;  `work`, `part`: chunks of a job, and files of them;  `learn`: trees that learn from a job
 //! - `occlusion_job`, `sunlight`, `visibility_job`: one job each
 //! - `mesh`, `sensors`, `table`, `atlas`: points that are baked
+//! - `placement`: sensors on roofs, facades and ground, and along lines
 //! - `ambient_occlusion`: the open part of the sky above points
+//! - `view_factors`: light that goes from surface to surface
+//! - `curvature`: lines of sight over a round earth
 //! - `visibility`: directions and points that points see;  `exposure`: sums of what they see
-//! - `sky`: the sky in patches;  `sun`: where the sun stands;  `moment`: dates, times of day and time zones
+//! - `sky`: the sky in patches;  `sun`: where the sun stands;  `moment`, `clock`: dates, times of day and time zones
+//! - `hourly`: values step by step;  `measures`: classes of sunlight, reflected light
 //! - `perez`: the light of the sky;  `epw`: weather files
 //! - `orientation`: where up and north are in a scene
 //! - `bits`: matrices of one bit per answer
@@ -80,15 +85,19 @@
 mod ambient_occlusion;
 mod atlas;
 mod bits;
+mod clock;
 mod creases;
+mod curvature;
 mod curve;
 mod directions;
 mod epw;
 mod error;
 mod exposure;
 mod glb;
+mod hourly;
 mod job;
 mod learn;
+mod measures;
 mod memory;
 mod mesh;
 mod moment;
@@ -99,12 +108,14 @@ mod occlusion_job;
 mod orientation;
 mod part;
 mod perez;
+mod placement;
 mod ply;
 mod sensors;
 mod sky;
 mod sun;
 mod sunlight;
 mod table;
+mod view_factors;
 mod visibility;
 mod visibility_job;
 mod work;
@@ -114,14 +125,18 @@ pub use ambient_occlusion::{
 };
 pub use atlas::Atlas;
 pub use bits::{BitMatrix, ones};
+pub use clock::Clock;
 pub use creases::{CREASE_ANGLE, Creased, inside_edges, split_at_creases};
+pub use curvature::{Curvature, EARTH_RADIUS, REFRACTION};
 pub use directions::Weighting;
 pub use epw::{BadWeather, Record, Weather};
 pub use error::Error;
 pub use exposure::{sky_view, sun_hours};
 pub use glb::write_glb;
+pub use hourly::{Hourly, Receipt};
 pub use job::{Job, Key, run};
 pub use learn::{Learned, learn_when_it_pays};
+pub use measures::SunlightClass;
 pub use mesh::Mesh;
 pub use moment::{BadMoment, Moment, is_leap_year};
 pub use monitor::Monitor;
@@ -131,12 +146,14 @@ pub use occlusion_job::{OcclusionJob, Openness};
 pub use orientation::{Orientation, UpAxis};
 pub use part::{Identity, Part};
 pub use perez::{Irradiance, perez_sky};
+pub use placement::{Placement, Surface};
 pub use ply::ShadedMesh;
-pub use sensors::{Grid, Layout, Sensors};
+pub use sensors::{Grid, Label, Layout, Sensors};
 pub use sky::{SkyDivision, SkyPatches};
 pub use sun::{Place, Refraction, SunPosition, sun_positions};
 pub use sunlight::{SunFound, SunJob, SunValues, Sunlight, Suns, TimeStep};
 pub use table::BadTable;
-pub use visibility::{SightLines, sees_directions, sees_each_other, sees_points};
+pub use view_factors::view_factors;
+pub use visibility::{SightLines, SightRange, sees_directions, sees_each_other, sees_points};
 pub use visibility_job::{Eyes, VisibilityJob};
 pub use work::Work;

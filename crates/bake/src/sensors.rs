@@ -11,8 +11,26 @@ pub struct Sensors {
     pub points: Vec<[f32; 3]>,
     /// Normals of the surfaces there, `[n, 3]`, or none: points in free space.
     pub normals: Vec<[f32; 3]>,
+    /// What else is known of each point, such as its name.
+    pub labels: Vec<Label>,
     /// Where the points come from.
     pub layout: Layout,
+}
+
+/// Texts of sensors that come back in tables of results: a column.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Label {
+    /// Name of the column.
+    pub column: String,
+    /// Texts, `[n]`.
+    pub values: Vec<String>,
+}
+
+impl Label {
+    pub(crate) fn new(column: &str, values: Vec<String>) -> Self {
+        let column = column.to_owned();
+        Self { column, values }
+    }
 }
 
 /// Where sensors come from.
@@ -36,6 +54,10 @@ pub struct Grid {
     pub height: usize,
     /// Cell of each sensor.
     pub cells: Vec<u32>,
+    /// North-western corner, in terms of east and north from the origin of the scene.
+    pub corner: [f64; 2],
+    /// Side of the cells.
+    pub spacing: f64,
 }
 
 impl Grid {
@@ -61,6 +83,7 @@ impl Sensors {
         Self {
             points: mesh.positions.clone(),
             normals: mesh.normals.clone(),
+            labels: Vec::new(),
             layout: Layout::Vertices,
         }
     }
@@ -127,12 +150,42 @@ impl Sensors {
         Ok(Self {
             points,
             normals,
+            labels: Vec::new(),
             layout: Layout::Grid(Grid {
                 width,
                 height,
                 cells,
+                corner: [low[0], high[1]],
+                spacing,
             }),
         })
+    }
+
+    /// Puts points without a height on the surface that is seen from above. A height that is missing is NaN, as
+    /// [`Sensors::from_table`] leaves it.
+    ///
+    /// # Errors
+    /// [`Error::OffSurface`] with the first point that no surface is below.
+    pub fn drape(&mut self, bvh: &Bvh, orientation: &Orientation) -> Result<(), Error> {
+        let Some(axis) = (0..3).find(|&axis| orientation.up[axis].abs() == 1.0) else {
+            return Ok(());
+        };
+        let bounds = bvh.bounds();
+        let (low, high) = extent(orientation, bounds.min, bounds.max);
+        let start = high[2] + 0.01 * (high[2] - low[2]).max(1.0);
+        let down = orientation.up.map(|x| -x as f32);
+        for (index, point) in self.points.iter_mut().enumerate() {
+            if !point[axis].is_nan() {
+                continue;
+            }
+            let mut above = *point;
+            above[axis] = (start * orientation.up[axis]) as f32;
+            let ray = Ray::new(above, down);
+            let hit = bvh.intersect(&ray).ok_or(Error::OffSurface { index })?;
+            let height = f64::from(above[axis]) + f64::from(hit.t) * f64::from(down[axis]);
+            point[axis] = height as f32;
+        }
+        Ok(())
     }
 
     /// Eyes of the sensors: raised by `height` along `up`, and an [origin offset](Aabb::origin_offset) above their surface if

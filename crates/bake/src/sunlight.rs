@@ -10,7 +10,7 @@ use crate::job::{bytes_of, words_of};
 use crate::memory;
 use crate::orientation::dot;
 use crate::{
-    BitMatrix, Error, Irradiance, Job, Key, Moment, Monitor, Orientation, Place, Refraction,
+    BitMatrix, Clock, Error, Irradiance, Job, Key, Moment, Monitor, Orientation, Place, Refraction,
     SkyPatches, SunPosition, Weather, Weighting, ones, perez_sky, sees_directions, sun_positions,
 };
 
@@ -31,12 +31,16 @@ pub struct TimeStep {
 }
 
 impl TimeStep {
-    /// Steps of so many seconds between two moments on clocks `zone` hours ahead of UTC. The last one may be shorter.
+    /// Steps of so many seconds between two moments on these clocks. The last one may be shorter.
     ///
     /// # Errors
     /// [`Error::NoTime`] if the period ends before it begins, [`Error::Steps`] if there are more than ten million.
-    pub fn regular([from, to]: [Moment; 2], zone: f64, seconds: f64) -> Result<Vec<Self>, Error> {
-        let [from, to] = [from.unix(zone), to.unix(zone)];
+    pub fn regular(
+        [from, to]: [Moment; 2],
+        clock: &Clock,
+        seconds: f64,
+    ) -> Result<Vec<Self>, Error> {
+        let [from, to] = [clock.unix(&from), clock.unix(&to)];
         let count = ((to - from) / seconds - 1e-9).ceil();
         if !(count >= 1.0) {
             return Err(Error::NoTime);
@@ -49,12 +53,28 @@ impl TimeStep {
             let length = seconds.min(to - begin);
             Self {
                 middle: begin + 0.5 * length,
-                begin: Moment::at_unix(begin, zone),
+                begin: clock.moment(begin),
                 hours: length / 3600.0,
                 irradiance: Irradiance::default(),
             }
         };
         Ok((0..count as usize).map(step).collect())
+    }
+
+    /// A step of so many seconds around a moment on these clocks.
+    pub fn around(moment: Moment, clock: &Clock, seconds: f64) -> Self {
+        let middle = clock.unix(&moment);
+        Self {
+            middle,
+            begin: clock.moment(middle - 0.5 * seconds),
+            hours: seconds / 3600.0,
+            irradiance: Irradiance::default(),
+        }
+    }
+
+    /// Hour of the day in the middle of the step, from 0 to 24.
+    pub fn hour(&self) -> f64 {
+        (self.begin.seconds / 3600.0 + 0.5 * self.hours).rem_euclid(24.0)
     }
 }
 
@@ -168,6 +188,16 @@ impl Sunlight {
         self.patches.directions(&self.orientation)
     }
 
+    /// Steps of time with their suns.
+    pub(crate) fn timeline(&self) -> &[(TimeStep, SunPosition)] {
+        &self.steps
+    }
+
+    /// Whether irradiance is known.
+    pub(crate) fn is_measured(&self) -> bool {
+        self.is_measured
+    }
+
     /// Light of the sky, if irradiance is known.
     fn sky(&self) -> Result<Option<SkyLight>, Error> {
         if !self.is_measured {
@@ -212,6 +242,8 @@ pub struct SunValues {
     pub by_month: Vec<f64>,
     /// Sky view factors, `[n]`: see [`sky_view`](crate::sky_view).
     pub sky_view: Vec<f64>,
+    /// Parts of the sky's solid angle that are seen, `[n]`.
+    pub sky_open: Vec<f64>,
     /// Irradiation by the sun in kWh/m², `[n]`; empty where irradiance is not known, as are all below.
     pub direct: Vec<f64>,
     /// Irradiation by the sky in kWh/m², `[n]`.
@@ -238,20 +270,13 @@ impl SunValues {
             ..
         } = job.sunlight;
         let sky = job.sunlight.sky()?;
-        let to_suns: Vec<[f64; 3]> = (suns.positions.iter())
-            .map(|sun| Orientation::default().direction(sun.azimuth, sun.elevation))
-            .collect();
+        let to_suns = to_suns(suns);
         let mut values = Self::default();
         for (list, width) in values.lists(sky.is_some()) {
             *list = memory::room("values", width * job.places.points.len())?;
         }
         for row in 0..job.places.points.len() {
-            // Of points in free space, what falls on a level surface there.
-            let normal = match job.facing.get(row) {
-                None => Some([0.0, 0.0, 1.0]),
-                Some(normal) => unscaled_unit(orientation.local(normal.map(f64::from))),
-            };
-            let Some(normal) = normal else {
+            let Some(normal) = facing(job.facing.get(row).copied(), orientation) else {
                 values.push_none(sky.is_some());
                 continue;
             };
@@ -269,6 +294,8 @@ impl SunValues {
             values.by_month.extend(months);
             let view = patches.view(normal, Weighting::Cosine, seen);
             values.sky_view.push(view);
+            let open = patches.view(normal, Weighting::Uniform, seen);
+            values.sky_open.push(open);
             if let Some(sky) = &sky {
                 let diffuse = |sky: &Vec<f64>| match sky.is_empty() {
                     true => 0.0,
@@ -295,12 +322,27 @@ impl SunValues {
     /// The lists, with their values per sensor.
     fn lists(&mut self, is_measured: bool) -> Vec<(&mut Vec<f64>, usize)> {
         let mut lists = vec![(&mut self.hours, 1), (&mut self.by_month, 12)];
-        lists.push((&mut self.sky_view, 1));
+        lists.extend([(&mut self.sky_view, 1), (&mut self.sky_open, 1)]);
         if is_measured {
             lists.extend([(&mut self.direct, 1), (&mut self.direct_by_month, 12)]);
             lists.extend([(&mut self.diffuse, 1), (&mut self.diffuse_by_month, 12)]);
         }
         lists
+    }
+}
+
+/// Directions to suns in terms of east, north and up.
+pub(crate) fn to_suns(suns: &Suns) -> Vec<[f64; 3]> {
+    let direction =
+        |sun: &SunPosition| Orientation::default().direction(sun.azimuth, sun.elevation);
+    suns.positions.iter().map(direction).collect()
+}
+
+/// Normal in terms of east, north and up, of length 1. Of points in free space, what falls on a level surface counts.
+pub(crate) fn facing(normal: Option<[f32; 3]>, orientation: &Orientation) -> Option<[f64; 3]> {
+    match normal {
+        None => Some([0.0, 0.0, 1.0]),
+        Some(normal) => unscaled_unit(orientation.local(normal.map(f64::from))),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use antumbra::LocalOrigin;
 
-use crate::{Layout, Sensors};
+use crate::{Label, Layout, Sensors};
 
 /// Why a text is no table of points.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -32,6 +32,9 @@ impl Sensors {
     /// # Ok::<(), antumbra_bake::BadTable>(())
     /// ```
     ///
+    /// A column of names, `name` or `id`, is kept as the label `name`. One of the columns x, y and z may be missing if the first line names the other
+    /// two: it is NaN then, and [`Sensors::drape`] finds heights.
+    ///
     /// # Errors
     /// [`BadTable`] names the first line that is not as it should be: a number is missing, is none, is not finite or has a
     /// decimal comma; a column is there twice; a line has more or fewer columns than the first.
@@ -47,13 +50,14 @@ impl Sensors {
             .into_iter()
             .find(|&mark| head.contains(mark));
         let head = fields(head, mark);
-        let (places, has_names) = columns(&head).map_err(|reason| bad(first, reason))?;
-        if has_names {
+        let columns = columns(&head).map_err(|reason| bad(first, reason))?;
+        if columns.has_head {
             lines.next();
         }
         let mut sensors = Self {
             points: Vec::new(),
             normals: Vec::new(),
+            labels: Vec::new(),
             layout: Layout::List,
         };
         for (line, text) in lines {
@@ -63,15 +67,25 @@ impl Sensors {
                 let reason = format!("found {found} columns, wanted {wanted} as in line {first}");
                 return Err(bad(line, reason));
             }
-            let mut numbers = [0.0; 6];
-            for (number, (&place, name)) in numbers.iter_mut().zip(places.iter().zip(COLUMNS)) {
-                let found = self::number(fields[place]);
-                *number = found.map_err(|reason| bad(line, format!("{name}: {reason}")))?;
+            let mut numbers = [f64::NAN; 6];
+            for (number, (place, name)) in
+                numbers.iter_mut().zip(columns.places.iter().zip(COLUMNS))
+            {
+                if let Some(place) = *place {
+                    let found = self::number(fields[place]);
+                    *number = found.map_err(|reason| bad(line, format!("{name}: {reason}")))?;
+                }
             }
             let [x, y, z, nx, ny, nz] = numbers;
             sensors.points.push(local.local([x, y, z]));
-            if places.len() == 6 {
+            if columns.places[3].is_some() {
                 sensors.normals.push([nx, ny, nz].map(|x| x as f32));
+            }
+            if columns.name.is_some() && sensors.labels.is_empty() {
+                sensors.labels.push(Label::new("name", Vec::new()));
+            }
+            if let (Some(place), [label, ..]) = (columns.name, &mut sensors.labels[..]) {
+                label.values.push(fields[place].to_owned());
             }
         }
         match sensors.points.is_empty() {
@@ -114,32 +128,51 @@ fn has_decimal_comma(field: &str) -> bool {
     field.contains(',') && field.replace(',', ".").parse::<f64>().is_ok()
 }
 
-/// Places of the columns by the first line of a table, and whether this line has their names.
-fn columns(head: &[&str]) -> Result<(Vec<usize>, bool), String> {
+/// Places of the columns of a table.
+struct Columns {
+    /// Those of [`COLUMNS`], as far as they are there.
+    places: [Option<usize>; 6],
+    /// Names of points.
+    name: Option<usize>,
+    /// Whether the first line has the names of the columns.
+    has_head: bool,
+}
+
+/// Columns by the first line of a table.
+fn columns(head: &[&str]) -> Result<Columns, String> {
     let is_number = |field: &&str| field.parse::<f64>().is_ok() || has_decimal_comma(field);
     if head.iter().all(is_number) {
         return match head.len() {
-            3 | 6 => Ok(((0..head.len()).collect(), false)),
+            3 | 6 => Ok(Columns {
+                places: std::array::from_fn(|place| (place < head.len()).then_some(place)),
+                name: None,
+                has_head: false,
+            }),
             found => Err(format!(
                 "found {found} columns without names, wanted x, y, z, or x, y, z, nx, ny, nz"
             )),
         };
     }
-    let mut places = Vec::new();
-    for name in COLUMNS {
+    let place = |name: &str| {
         let fields = head.iter().enumerate();
         let mut found = fields.filter(|(_, field)| field.eq_ignore_ascii_case(name));
-        places.extend(found.next().map(|(place, _)| place));
-        if found.next().is_some() {
-            return Err(format!("found the column {name} twice"));
+        let first = found.next().map(|(place, _)| place);
+        match found.next() {
+            Some(_) => Err(format!("found the column {name} twice")),
+            None => Ok(first),
         }
-    }
-    let named = |names: &[&str]| {
-        let has = |name: &&str| head.iter().any(|field| field.eq_ignore_ascii_case(name));
-        names.iter().filter(|name| has(name)).count()
     };
-    match (named(&COLUMNS[..3]), named(&COLUMNS[3..])) {
-        (3, 0 | 3) => Ok((places, true)),
+    let mut places = [None; 6];
+    for (found, name) in places.iter_mut().zip(COLUMNS) {
+        *found = place(name)?;
+    }
+    let count = |places: &[Option<usize>]| places.iter().flatten().count();
+    match (count(&places[..3]), count(&places[3..])) {
+        (2 | 3, 0) | (3, 3) => Ok(Columns {
+            places,
+            name: place("name")?.or(place("id")?),
+            has_head: true,
+        }),
         _ => Err("found no columns x, y, z, or x, y, z, nx, ny, nz".into()),
     }
 }
@@ -167,6 +200,9 @@ mod tests {
             assert_eq!(sensors.points, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], "{text}");
             assert!(sensors.normals.is_empty());
         }
+        let named = read("id,x,y\nroof,1,2\n").expect("a table");
+        assert_eq!(named.labels, [Label::new("name", vec!["roof".into()])]);
+        assert!(named.points[0][2].is_nan(), "a height that is missing");
         let with_normals = read("X,Y,Z,NX,NY,NZ\n1,2,3,0,0,1").expect("a table");
         assert_eq!(with_normals.normals, [[0.0, 0.0, 1.0]]);
     }
@@ -175,7 +211,8 @@ mod tests {
     fn mistakes_have_a_line_and_say_what_is_wrong() {
         for (text, line, word) in [
             ("", 1, "no points"),
-            ("x,y\n1,2", 1, "x, y, z"),
+            ("x,w\n1,2", 1, "x, y, z"),
+            ("x,y,nx,ny,nz\n1,2,3,4,5", 1, "x, y, z"),
             ("x,y,z,nx\n1,2,3,4", 1, "nx, ny, nz"),
             ("1,2,3,4\n", 1, "4 columns"),
             ("1,2,3,4,5,6,7,8\n", 1, "8 columns"),

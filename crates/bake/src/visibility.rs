@@ -339,13 +339,36 @@ pub fn sees_points(
     margin: Option<f32>,
     monitor: &dyn Monitor,
 ) -> Result<BitMatrix, Error> {
+    sees_points_within(bvh, (from, to), margin, None, monitor)
+}
+
+/// Greatest distance of points that see each other: the length in plan, and the direction up.
+pub type SightRange = (f64, [f64; 3]);
+
+/// [`sees_points`], where points that are farther apart than a range do not see each other.
+pub(crate) fn sees_points_within(
+    bvh: &Bvh,
+    (from, to): (&[[f32; 3]], &[[f32; 3]]),
+    margin: Option<f32>,
+    range: Option<SightRange>,
+    monitor: &dyn Monitor,
+) -> Result<BitMatrix, Error> {
     let lines = SightLines::new(bvh, margin)?;
     let order = along_curve(to)?;
     let ends = lines.ends(to, order.iter().map(|&place| place as usize))?;
+    let is_near = |a: [f32; 3], b: [f32; 3]| {
+        range.is_none_or(|(most, up)| {
+            let apart = [0, 1, 2].map(|axis| f64::from(b[axis]) - f64::from(a[axis]));
+            let height = dot(apart, up);
+            dot(apart, apart) - height * height <= most * most
+        })
+    };
     let rays = |row: usize, send: &mut dyn FnMut(usize, Ray)| {
         let from = (from[row], lines.margin(from[row]));
         for (&column, &end) in order.iter().zip(&ends) {
-            send_between(from, end, |ray| send(column as usize, ray));
+            if is_near(from.0, end.0) {
+                send_between(from, end, |ray| send(column as usize, ray));
+            }
         }
     };
     let task = Task {

@@ -6,7 +6,8 @@ use antumbra::{Aabb, Bvh};
 
 use crate::job::{bytes_of, words_of};
 use crate::orientation::dot;
-use crate::{BitMatrix, Error, Job, Key, Monitor, Sensors, ones, sees_each_other, sees_points};
+use crate::visibility::{SightRange, sees_points_within};
+use crate::{BitMatrix, Error, Job, Key, Monitor, Sensors, ones, sees_each_other};
 
 /// Eyes of sensors, with the normals of their surfaces.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +38,7 @@ impl<'a> Eyes<'a> {
     }
 }
 
-/// Job of a [`BitMatrix`]: which eyes see each other, as [`sees_points`] and [`sees_each_other`] say. Eyes with normals see
+/// Job of a [`BitMatrix`]: which eyes see each other, as [`sees_points`](crate::sees_points) and [`sees_each_other`] say. Eyes with normals see
 /// nothing below their surfaces.
 pub struct VisibilityJob<'a> {
     /// Eyes that have a row.
@@ -46,6 +47,9 @@ pub struct VisibilityJob<'a> {
     pub columns: Option<&'a Eyes<'a>>,
     /// Length left out at both ends of lines of sight, as for [`SightLines`](crate::SightLines).
     pub margin: Option<f32>,
+    /// Greatest distance in plan between eyes that see each other, with the direction up; `None` for any. Only where rows and
+    /// columns differ.
+    pub range: Option<SightRange>,
 }
 
 impl VisibilityJob<'_> {
@@ -69,6 +73,9 @@ impl Job for VisibilityJob<'_> {
 
     fn identify(&self, key: &mut Key) {
         key.text(&format!("{:?} {}", self.margin, self.columns.is_some()));
+        if let Some(range) = self.range {
+            key.text(&format!("{range:?}"));
+        }
         for list in [&self.rows.points, &self.columns().points, self.rows.normals] {
             key.vectors(list);
         }
@@ -82,7 +89,10 @@ impl Job for VisibilityJob<'_> {
     ) -> Result<Vec<u8>, Error> {
         let (rows, margin) = (&self.rows.points, self.margin);
         let seen = match self.columns {
-            Some(columns) => sees_points(bvh, &rows[items], &columns.points, margin, monitor),
+            Some(columns) => {
+                let points = (&rows[items], &columns.points[..]);
+                sees_points_within(bvh, points, margin, self.range, monitor)
+            }
             None => sees_each_other(bvh, rows, items, margin, monitor),
         }?;
         bytes_of(seen.words())

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 
 use super::{SCENE, SCENE_LONG, heading};
 
@@ -11,7 +11,7 @@ use super::{SCENE, SCENE_LONG, heading};
 pub enum FarmCommand {
     /// Submit an array job of Slurm, and a job that merges
     ///
-    /// Every task renders one part of the image, and a dependent job merges them. Tasks that are preempted, lose
+    /// Every task computes one part of an image, or of a job of ao, sun or visible, and a dependent job merges them. Tasks that are preempted, lose
     /// their machine or come near their time limit go on from their checkpoints. The dependent job submits again
     /// what is missing. So does this command when it is given again. Prints the numbers of the jobs.
     Slurm(SlurmArgs),
@@ -22,14 +22,40 @@ pub enum FarmCommand {
     Openjd(OpenjdArgs),
 }
 
+/// Commands that many machines can share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FarmJob {
+    Render,
+    Ao,
+    Sun,
+    Visible,
+}
+
+impl FarmJob {
+    /// Name of the command.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Render => "render",
+            Self::Ao => "ao",
+            Self::Sun => "sun",
+            Self::Visible => "visible",
+        }
+    }
+}
+
 /// Flags of everything that renders on many machines.
 #[derive(Debug, Args)]
 pub struct FarmArgs {
     #[arg(help = SCENE, long_help = SCENE_LONG)]
     pub scene: PathBuf,
-    /// Image to write, .exr or .png
-    #[arg(short, long, value_name = "FILE", help_heading = heading::OUTPUT)]
-    pub output: PathBuf,
+    /// File to write: an image, or a result of the job
+    ///
+    /// May be given several times for jobs of sun and visible.
+    #[arg(short, long, value_name = "FILE", required = true, help_heading = heading::OUTPUT)]
+    pub output: Vec<PathBuf>,
+    /// Command to run: render, ao, sun or visible
+    #[arg(long = "command", value_name = "COMMAND", value_enum, default_value_t = FarmJob::Render, hide_possible_values = true, help_heading = heading::JOB)]
+    pub job: FarmJob,
     /// Standard error of every pixel's mean, as .exr
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub stderr_image: Option<PathBuf>,
@@ -47,8 +73,10 @@ pub struct FarmArgs {
     /// Program, as the machines find it
     #[arg(long, value_name = "FILE", help_heading = heading::JOB)]
     pub program: Option<PathBuf>,
-    /// Flags of `render` for every task
-    #[arg(last = true, value_name = "RENDER FLAGS")]
+    /// Arguments of the command for every task
+    ///
+    /// Behind the scene: for visible, tables of points come first.
+    #[arg(last = true, value_name = "FLAGS")]
     pub flags: Vec<String>,
 }
 

@@ -23,10 +23,13 @@ mod merge;
 mod names;
 mod picture;
 mod probe;
+mod raster;
 mod render;
+mod sensors;
 mod slips;
 mod study;
 mod sun;
+mod times;
 mod tree;
 mod values;
 mod view;
@@ -43,7 +46,7 @@ pub use bench::BenchArgs;
 pub use camera::{CameraArgs, PoseArgs};
 pub use chunks::ChunkArgs;
 pub use display::{AovNames, DisplayArgs, is_for_displays, usual};
-pub use farm::{FarmArgs, FarmCommand, OpenjdArgs, SlurmArgs};
+pub use farm::{FarmArgs, FarmCommand, FarmJob, OpenjdArgs, SlurmArgs};
 pub use image::{CompareArgs, ImageCommand};
 pub use info::InfoArgs;
 pub use list::{ListArgs, ListName};
@@ -53,10 +56,13 @@ pub use map::MapArgs;
 pub use merge::MergeArgs;
 pub use picture::PictureArgs;
 pub use probe::ProbeArgs;
+pub use raster::RasterArgs;
 pub use render::{RenderArgs, UntilArgs};
+pub use sensors::PlacementArgs;
 pub use slips::parse;
 pub use study::StudyArgs;
 pub use sun::{Shown, SunArgs};
+pub use times::TimeArgs;
 pub use values::CameraChoice;
 pub use view::ViewArgs;
 pub use visible::VisibleArgs;
@@ -81,7 +87,7 @@ mod heading {
 const SCENE: &str = "Scene file, - or builtin:NAME[:TRIANGLES]";
 const SCENE_LONG: &str = "\
 Scene: a .pbrt file, a mesh (.ply, .obj, .stl, .gltf or .glb, with its materials, shown under a clear sky unless it \
-has lights), or a built-in scene as builtin:NAME[:TRIANGLES], such as builtin:city or builtin:city:20000. - reads a \
+has lights), a height raster (.tif, .asc or .npy), or a built-in scene as builtin:NAME[:TRIANGLES], such as builtin:city or builtin:city:20000. - reads a \
 .pbrt file from the standard input";
 
 /// Ray tracing that learns from shadow rays

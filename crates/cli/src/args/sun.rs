@@ -6,7 +6,10 @@ use std::str::FromStr;
 use antumbra_bake::{Moment, SkyDivision, UpAxis};
 use clap::{ArgGroup, Args, ValueEnum};
 
-use super::{ChunkArgs, MachineArgs, MapArgs, SCENE, SCENE_LONG, heading, values};
+use super::{
+    ChunkArgs, MachineArgs, MapArgs, PlacementArgs, RasterArgs, SCENE, SCENE_LONG, TimeArgs,
+    heading, values,
+};
 use crate::json::Destination;
 
 /// Flags of `sun`.
@@ -15,11 +18,12 @@ use crate::json::Destination;
 pub struct SunArgs {
     #[arg(help = SCENE, long_help = SCENE_LONG)]
     pub scene: PathBuf,
-    /// What to write: .csv, .ply, .npz, .png, .svg or .pdf
+    /// What to write: .csv, .ply, .npz, .png, .svg, .pdf or .tif
     ///
     /// May be given several times. A .csv has a line per sensor, a .ply the mesh or the sensors in colours, a .png, .svg
     /// or .pdf a map of a --grid, and an .npz all values with the visibility matrices. Beside a .png is a .pgw, the world file
-    /// for GIS programs. A shard is a .part.
+    /// for GIS programs. A .tif (GeoTIFF), .asc or .npy has the value of --show in the cells of a --grid or of a scene that is a
+    /// raster. A shard is a .part.
     #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
     /// Value that colours show
@@ -29,13 +33,21 @@ pub struct SunArgs {
     pub show: Shown,
     #[command(flatten)]
     pub map: MapArgs,
+    #[command(flatten)]
+    pub raster: RasterArgs,
+    /// Table of every step of time and every sensor
+    ///
+    /// A .csv with a line per step and a column per sensor: the value of --show of this step, in hours or Wh/m².
+    #[arg(long, value_name = "FILE", value_parser = values::output_file(), conflicts_with = "shard", help_heading = heading::OUTPUT)]
+    pub hourly: Option<PathBuf>,
     /// Figures as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
     pub json: Option<Destination>,
-    /// Sensors from a table: x, y, z [, nx, ny, nz]
+    /// Sensors from a table: x, y [, z] [, nx, ny, nz]
     ///
     /// Columns are known by the names in the first line, or else by their order. Sensors without normals see all around.
-    /// Coordinates are those of the mesh.
+    /// Coordinates are those of the mesh. Sensors without heights are on the surface that is seen from above. Names, in a column
+    /// name or id, come back in a .csv.
     #[arg(long, value_name = "FILE", group = "where", help_heading = heading::SENSORS)]
     pub sensors: Option<PathBuf>,
     /// A sensor in every square of this size
@@ -44,8 +56,12 @@ pub struct SunArgs {
     #[arg(long, value_name = "METRES", group = "where", value_parser = values::positive, help_heading = heading::SENSORS)]
     pub grid: Option<f64>,
     /// A sensor at every vertex of the mesh
-    #[arg(long, group = "where", help_heading = heading::SENSORS)]
+    ///
+    /// Vertices of a height raster are the centres of its cells.
+    #[arg(long, visible_alias = "cells", group = "where", help_heading = heading::SENSORS)]
     pub vertices: bool,
+    #[command(flatten)]
+    pub placement: PlacementArgs,
     /// Axis that points up [default: that of the scene]
     ///
     /// North is y where z points up, and -z where y does.
@@ -68,11 +84,8 @@ pub struct SunArgs {
     /// Metres above the sea [default: the weather's, or 0]
     #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = heading::SUN)]
     pub altitude: Option<f64>,
-    /// Hours ahead of UTC [default: by the longitude]
-    ///
-    /// Without summer time. Of a weather file, its own is the default. Otherwise it is the longitude over 15, rounded.
-    #[arg(long, value_name = "HOURS", allow_negative_numbers = true, help_heading = heading::SUN)]
-    pub timezone: Option<f64>,
+    #[command(flatten)]
+    pub times: TimeArgs,
     /// Weather of a year, for irradiance
     ///
     /// An .epw file of EnergyPlus. Gives the place and the steps of time, too.
@@ -89,6 +102,21 @@ pub struct SunArgs {
     /// Year, if --from and --to are absent
     #[arg(long, value_name = "YEAR", default_value_t = 2025, conflicts_with = "from", value_parser = clap::value_parser!(i32).range(1..=5999), help_heading = heading::SUN)]
     pub year: i32,
+    /// Light that the ground reflects, with --epw
+    ///
+    /// As a part of what open level ground receives: 0.2 is usual. A tilted sensor receives albedo times that, times (1 - cos
+    /// tilt) / 2, whatever shades the ground. In the column reflected_kwh_m2, and in the total of --show.
+    #[arg(long, value_name = "PART", requires = "epw", value_parser = values::part, help_heading = heading::SUN)]
+    pub albedo: Option<f64>,
+    /// Leave out suns lower than this
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = values::from_zero, help_heading = heading::SUN)]
+    pub min_elevation: f64,
+    /// Class of sunlight by EN 17037
+    ///
+    /// In the column en17037 of a .csv: none, minimum (from 1.5 h), medium (3 h) or high (4 h). The time must be one day from 1
+    /// February to 21 March, in steps of at most 10 minutes. Give the least elevation of your country with --min-elevation.
+    #[arg(long, conflicts_with = "epw", help_heading = heading::SUN)]
+    pub en17037: bool,
     /// Minutes from sun to sun
     ///
     /// Each sun stands for the step around it: the sun is that of the middle of the step.

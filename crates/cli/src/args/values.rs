@@ -291,6 +291,14 @@ pub fn from_zero(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Parses a part of a whole.
+pub fn part(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if (0.0..=1.0).contains(&number) => Ok(number),
+        _ => Err("it must be a number from 0 to 1".into()),
+    }
+}
+
 /// Parses the cost of a step of a traversal.
 pub fn cost(text: &str) -> Result<f32, String> {
     let cost: f32 = text.parse().map_err(|_| "no number".to_owned())?;

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use antumbra_bake::UpAxis;
 use clap::{ArgGroup, Args};
 
-use super::sun::up_axis;
-use super::{ChunkArgs, MachineArgs, MapArgs, SCENE, SCENE_LONG, heading, values};
+use super::sun::{Unit, up_axis};
+use super::{ChunkArgs, MachineArgs, MapArgs, RasterArgs, SCENE, SCENE_LONG, heading, values};
 use crate::json::Destination;
 
 /// Flags of `visible`.
@@ -15,8 +15,9 @@ use crate::json::Destination;
 pub struct VisibleArgs {
     #[arg(help = SCENE, long_help = SCENE_LONG)]
     pub scene: PathBuf,
-    /// Points that look: x, y, z [, nx, ny, nz]
+    /// Points that look: x, y [, z] [, nx, ny, nz]
     ///
+    /// Points without the column of heights (z, or y where y is up) are put on the surface that is seen from above.
     /// Columns are known by the names in the first line, or else by their order. Points with normals look from a little
     /// above their surface, and see nothing behind it.
     #[arg(value_name = "A.csv")]
@@ -24,15 +25,18 @@ pub struct VisibleArgs {
     /// Points looked at [default: those of A.csv]
     #[arg(value_name = "B.csv", conflicts_with = "surface")]
     pub to: Option<PathBuf>,
-    /// What to write: .npz, .csv, .ply, .png, .svg or .pdf
+    /// What to write: .npz, .csv, .ply, .png, .svg, .pdf or .tif
     ///
     /// May be given several times. An .npz has the matrix as bits with the counts, a .csv the count of every point of A (of a
     /// viewshed: of every place), a .ply the points of A or the mesh in colours, and a .png, .svg or .pdf a map of
-    /// --viewshed with --grid. Beside a .png is a .pgw, the world file for GIS programs. A shard is a .part.
+    /// --viewshed with --grid. Beside a .png is a .pgw, the world file for GIS programs. A .tif (GeoTIFF), .asc or .npy has the
+    /// counts in the cells of a --grid or of a scene that is a raster. A shard is a .part.
     #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
     #[command(flatten)]
     pub map: MapArgs,
+    #[command(flatten)]
+    pub raster: RasterArgs,
     /// Lines of sight: .csv of pairs, .ply of edges
     ///
     /// Lines of sight of shards are written by `merge`.
@@ -64,6 +68,23 @@ pub struct VisibleArgs {
     /// Axis that points up [default: that of the scene]
     #[arg(long, value_name = "AXIS", value_parser = up_axis, help_heading = heading::WORK)]
     pub up: Option<UpAxis>,
+    /// Greatest distance in plan at which a place is seen
+    #[arg(long, value_name = "UNITS", requires = "viewshed", value_parser = values::positive, help_heading = heading::WORK)]
+    pub radius: Option<f64>,
+    /// Take the earth as round, and light as bent by air
+    ///
+    /// Places d away lie lower by (1 - k) d² / (2 R), with --refraction k and the --earth-radius R.
+    #[arg(long, help_heading = heading::WORK)]
+    pub curvature: bool,
+    /// Coefficient of refraction; 0 without air
+    #[arg(long, value_name = "K", default_value_t = antumbra_bake::REFRACTION, allow_negative_numbers = true, requires = "curvature", help_heading = heading::WORK)]
+    pub refraction: f64,
+    /// Radius of the earth
+    #[arg(long, value_name = "METRES", default_value_t = antumbra_bake::EARTH_RADIUS, requires = "curvature", value_parser = values::positive, help_heading = heading::WORK)]
+    pub earth_radius: f64,
+    /// Unit of the scene, for --curvature: m, ft, ...
+    #[arg(long, value_enum, default_value_t = Unit::M, hide_possible_values = true, requires = "curvature", help_heading = heading::WORK)]
+    pub units: Unit,
     #[command(flatten)]
     pub chunks: ChunkArgs,
     #[command(flatten)]

@@ -11,12 +11,14 @@ use antumbra_bake::{
 use antumbra_image::{Image, Rgb8Image, Window, atomic_write};
 use antumbra_lab::{count, thread_seconds};
 use antumbra_load::{MemorySize, set_resolution};
+use antumbra_raster::Quantity;
 use serde::Serialize;
 
 use super::chunks::{self, PartFile};
 use super::command::{Bake, Head, text};
 use super::files::{self, Format};
 use super::ground::Ground;
+use super::raster;
 use super::view::View;
 use crate::args::AoArgs;
 use crate::exit::{Failure, tell};
@@ -67,7 +69,7 @@ enum Target {
 }
 
 /// Refuses outputs that cannot be made, before anything is read.
-fn check(args: &AoArgs) -> Result<Format, Failure> {
+pub fn check(args: &AoArgs) -> Result<Format, Failure> {
     let pose = args.pose.given();
     if let (Some(_), Some(flag)) = (args.atlas, pose) {
         return Err(Failure::Usage(format!(
@@ -81,9 +83,17 @@ fn check(args: &AoArgs) -> Result<Format, Failure> {
             false => Format::Ply,
         });
     }
-    let known = ["ply", "glb", "npz", "png", "exr"];
-    let sentence = "meshes are written as ply, glb or npz, pictures and textures as png or exr";
+    let known = [
+        "ply", "glb", "npz", "png", "exr", "tif", "tiff", "asc", "npy",
+    ];
+    let sentence = "meshes are written as ply, glb or npz, pictures and textures as png or exr, rasters as tif, asc or npy";
     let format = Format::of(&args.output, &known, sentence)?;
+    if format == Format::Raster && (!raster::is_raster(&args.scene) || args.bent_normals) {
+        return Err(Failure::Usage(format!(
+            "{}: a raster needs a scene that is one, and holds no --bent-normals",
+            args.output.display()
+        )));
+    }
     let flag = match (args.atlas, args.resolution) {
         (Some(_), _) => Some("--atlas"),
         (None, Some(_)) => Some("--resolution"),
@@ -109,6 +119,7 @@ pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Res
         chunks: &args.chunks,
         machine: &args.machine,
         parts,
+        earth: None,
     };
     let mut files = bake.declare(&[], &[])?;
     let mut ground = bake.ground(isa, memory, &mut files)?;
@@ -264,6 +275,16 @@ fn write_mesh(
                 entries.push(Entry::new("bent_normals", Array::Points(mesh.bent_normals)));
             }
             files::npz(path, &entries)
+        }
+        Format::Raster => {
+            let cells = ground.loaded.raster.as_ref().ok_or_else(|| {
+                Failure::Usage(format!("{}: the scene is no raster", path.display()))
+            })?;
+            let quantity = Quantity {
+                name: PROPERTY,
+                unit: "",
+            };
+            raster::write_cells(path, cells, &found.open, quantity)
         }
         _ => files::ply(path, PROPERTY, &mesh),
     }

@@ -10,7 +10,7 @@ use antumbra_load::MemorySize;
 use serde::Serialize;
 
 use super::chunks::{self, PartFile};
-use super::ground::Ground;
+use super::ground::{Earth, Ground};
 use crate::args::{ChunkArgs, MachineArgs};
 use crate::exit::{Failure, tell};
 use crate::json::Destination;
@@ -27,6 +27,8 @@ pub struct Bake<'a> {
     pub machine: &'a MachineArgs,
     /// Shares to take instead of computing anything.
     pub parts: Option<&'a [PartFile]>,
+    /// What the scene is bent by.
+    pub earth: Option<Earth>,
 }
 
 /// Beginning of a JSON document.
@@ -83,7 +85,7 @@ impl Bake<'_> {
         files: &mut Files,
     ) -> Result<Ground, Failure> {
         self.machine.start_threads()?;
-        Ground::load(self.scene, isa, memory, files)
+        Ground::load(self.scene, isa, memory, files, self.earth)
     }
 
     /// Computes a job with a tree of the scene, or the share of it that is asked for; or joins the parts.

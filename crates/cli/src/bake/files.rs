@@ -1,10 +1,11 @@
 //! Formats and writers of results.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::Path;
 
 use antumbra::LocalOrigin;
-use antumbra_bake::{Entry, Layout, Mesh, Sensors, ShadedMesh, npz_bytes, write_npz};
+use antumbra_bake::{Entry, Label, Layout, Mesh, Sensors, ShadedMesh, npz_bytes, write_npz};
 use antumbra_image::{atomic_write, heatmap};
 
 use crate::exit::Failure;
@@ -18,13 +19,17 @@ pub enum Format {
     Npz,
     Picture,
     Ply,
+    /// GeoTIFF, .asc or .npy.
+    Raster,
 }
 
 impl Format {
     /// Format of results of sensors.
     pub fn of_sensors(path: &Path) -> Result<Self, Failure> {
-        let known = ["csv", "ply", "png", "svg", "pdf", "npz"];
-        let sentence = "results are written as csv, ply, npz, png, svg or pdf";
+        let known = [
+            "csv", "ply", "png", "svg", "pdf", "npz", "tif", "tiff", "asc", "npy",
+        ];
+        let sentence = "results are written as csv, ply, npz, png, svg, pdf, tif, asc or npy";
         Self::of(path, &known, sentence)
     }
 
@@ -39,6 +44,7 @@ impl Format {
             Some(&"glb") => Ok(Self::Glb),
             Some(&"npz") => Ok(Self::Npz),
             Some(&"ply") => Ok(Self::Ply),
+            Some(&("tif" | "tiff" | "asc" | "npy")) => Ok(Self::Raster),
             Some(_) => Ok(Self::Picture),
             None => Err(Failure::Usage(format!("{}: {sentence}", path.display()))),
         }
@@ -90,24 +96,42 @@ pub fn coloured(
     ply(path, name, &mesh)
 }
 
+/// A text as a field of a .csv.
+pub fn field(text: &str) -> Cow<'_, str> {
+    match text.contains([',', '"', '\n', '\r']) {
+        true => Cow::Owned(format!("\"{}\"", text.replace('"', "\"\""))),
+        false => Cow::Borrowed(text),
+    }
+}
+
 /// Decimals of coordinates that are measured from an origin.
 const MICRO: f64 = 1e6;
 
-/// Writes a table of sensors: their points in the world, the normals if `normals` are given, and the values of each.
+/// Writes a table of sensors: their points in the world, the normals if `normals` are given, what else is known of
+/// each, and its values.
 pub fn table(
     path: &Path,
     (points, local): (&[[f32; 3]], LocalOrigin),
-    normals: &[[f32; 3]],
+    (normals, labels): (&[[f32; 3]], &[Label]),
     (head, room): (&str, u64),
     row: impl Fn(usize) -> Vec<f64>,
 ) -> Result<(), Failure> {
     output::check_room(path, room * points.len() as u64)?;
     Ok(atomic_write(path, |file| {
         let normal_head = if normals.is_empty() { "" } else { ",nx,ny,nz" };
-        writeln!(file, "x,y,z{normal_head},{head}")?;
+        let mut label_head = String::new();
+        for label in labels {
+            label_head += &field(&label.column);
+            label_head.push(',');
+        }
+        writeln!(file, "{label_head}x,y,z{normal_head},{head}")?;
         let mut line = String::new();
         for (index, point) in points.iter().enumerate() {
             line.clear();
+            for label in labels {
+                line += &field(&label.values[index]);
+                line.push(',');
+            }
             let _ = match (local.origin, local.world(*point)) {
                 ([0.0, 0.0, 0.0], _) => write!(line, "{},{},{}", point[0], point[1], point[2]),
                 (_, world) => {

@@ -1,13 +1,14 @@
 //! Scenes that are baked, and points of them.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use antumbra::recipe::Builder;
 use antumbra::{Bvh, Isa, LocalOrigin, Width};
-use antumbra_bake::{CREASE_ANGLE, Error, Key, Mesh, Orientation, Sensors, UpAxis};
+use antumbra_bake::{CREASE_ANGLE, Curvature, Error, Key, Mesh, Orientation, Sensors, UpAxis};
 use antumbra_lab::count;
-use antumbra_load::{Loaded, MemorySize, Up};
+use antumbra_load::{Extent, Loaded, MemorySize, Up};
 use antumbra_render::World;
 use antumbra_scene::{Geometry, Scene, Shape, TriangleMesh};
 
@@ -24,6 +25,8 @@ pub struct Ground {
     pub mesh: Mesh,
     /// Origin of all positions.
     pub local: LocalOrigin,
+    /// How the scene is bent, if it is.
+    pub curvature: Option<Curvature>,
     pub build_seconds: f64,
 }
 
@@ -34,12 +37,17 @@ impl Ground {
         isa: Isa,
         memory: MemorySize,
         files: &mut Files,
+        earth: Option<Earth>,
     ) -> Result<Self, Failure> {
         let mut loaded = scenes::load(name, memory)?;
         files.reads_all(&loaded.inputs)?;
         let flat = loaded.scene.flattened();
         let flat = flat.map_err(|error| Failure::scene(&loaded.scene.name, error))?;
         loaded.scene = flat.into_owned();
+        let curvature = match earth {
+            Some(earth) => Some(earth.bend(&mut loaded)?),
+            None => None,
+        };
         let (mesh, _) = mesh(&loaded.scene, false)?;
         let local = LocalOrigin {
             origin: loaded.scene.origin.into(),
@@ -54,6 +62,7 @@ impl Ground {
             bvh,
             mesh,
             local,
+            curvature,
             build_seconds: start.elapsed().as_secs_f64(),
         })
     }
@@ -137,6 +146,49 @@ impl Ground {
     }
 }
 
+/// An earth that scenes are bent by.
+#[derive(Clone, Copy, Debug)]
+pub struct Earth {
+    /// In units of the scene.
+    pub radius: f64,
+    pub refraction: f64,
+    /// The up axis, if the command line has one.
+    pub up: Option<UpAxis>,
+}
+
+impl Earth {
+    /// Bends all meshes, so that lines of sight over a round earth are straight.
+    fn bend(self, loaded: &mut Loaded) -> Result<Curvature, Failure> {
+        let scene = &mut loaded.scene;
+        let up = match (self.up, loaded.up.axis) {
+            (Some(up), _) => up,
+            (None, Up::Y) => UpAxis::Y,
+            (None, _) => UpAxis::Z,
+        };
+        let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
+        let extent = Extent::of(scene);
+        let centre = extent.map_or([0.0; 3], |extent| {
+            extent.low.midpoint(extent.high).to_array()
+        });
+        let curvature = Curvature::new(self.radius, self.refraction, centre, plan);
+        let curvature = curvature.map_err(Failure::usage)?;
+        for shape in &mut scene.shapes {
+            let Geometry::Mesh(mesh) = &mut shape.geometry else {
+                let reason = "--curvature: it has spheres, which cannot be bent";
+                return Err(Failure::scene(&scene.name, reason));
+            };
+            let mesh = Arc::make_mut(mesh);
+            for (normal, &point) in mesh.normals.iter_mut().zip(&mesh.positions) {
+                *normal = curvature.bend_normal(point, normal.to_array()).into();
+            }
+            for point in &mut mesh.positions {
+                *point = curvature.bend(*point);
+            }
+        }
+        Ok(curvature)
+    }
+}
+
 /// All meshes of a scene without instances, perhaps with creases, and how many vertices these add.
 ///
 /// # Errors
@@ -182,8 +234,32 @@ fn push(all: &mut Mesh, shape: &Shape, mesh: &TriangleMesh, creases: bool) -> us
     0
 }
 
-/// Sensors of a file, measured from the origin of a scene.
-pub fn sensors(path: &Path, local: &LocalOrigin) -> Result<Sensors, Failure> {
-    let sensors = Sensors::from_table(&input::text(path)?, local);
-    sensors.map_err(|bad| Failure::Data(format!("{}:{}: {}", path.display(), bad.line, bad.reason)))
+/// Sensors of a file, measured from the origin of a scene, and bent with it. Those without a height are put on the surface.
+pub fn sensors(path: &Path, ground: &Ground, plan: &Orientation) -> Result<Sensors, Failure> {
+    let name = path.display();
+    let bad = |line: usize, reason: &str| Failure::Data(format!("{name}:{line}: {reason}"));
+    let sensors = Sensors::from_table(&input::text(path)?, &ground.local);
+    let mut sensors = sensors.map_err(|error| bad(error.line, &error.reason))?;
+    // Of a table, one axis is missing in all points or in none.
+    let missing = |axis: usize| {
+        sensors
+            .points
+            .first()
+            .is_some_and(|point| point[axis].is_nan())
+    };
+    let is_up = |axis: usize| plan.up[axis].abs() == 1.0;
+    if let Some(axis) = (0..3).find(|&axis| missing(axis) && !is_up(axis)) {
+        let name = ["x", "y", "z"][axis];
+        return Err(bad(1, &format!("found no column {name}, which is not up")));
+    }
+    if let Some(curvature) = &ground.curvature {
+        for point in &mut sensors.points {
+            if !point.iter().any(|x| x.is_nan()) {
+                *point = curvature.bend(*point);
+            }
+        }
+    }
+    let draped = sensors.drape(&ground.bvh, plan);
+    draped.map_err(|error| Failure::Data(format!("{name}: {error}")))?;
+    Ok(sensors)
 }

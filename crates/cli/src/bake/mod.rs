@@ -6,7 +6,7 @@
 //! - `command`: the steps that all of them have in common
 //! - `ground`, `view`: scenes, and points of them
 //! - `chunks`: files of unfinished work and of shares
-//! - `files`: formats and writers of results;  `map`: maps of grids
+//! - `files`: formats and writers of results;  `map`: maps of grids;  `raster`: results as GeoTIFF, .asc and .npy
 
 pub mod ao;
 pub mod chunks;
@@ -15,6 +15,7 @@ mod files;
 mod ground;
 pub mod map;
 pub mod merge;
+mod raster;
 pub mod sun;
 mod view;
 pub mod visible;

@@ -1,14 +1,18 @@
 //! `antumbra sun`: hours of direct sun, sky view factors and irradiation of sensors.
 
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use antumbra_bake::{
-    Array, Entry, Error, Layout, Moment, Orientation, Place, Refraction, Sensors, SunFound, SunJob,
-    SunValues, Sunlight, TimeStep, UpAxis, Weather, sun_positions,
+    Array, Clock, Entry, Error, Hourly, Label, Layout, Moment, Orientation, Place, Placement,
+    Refraction, Sensors, SunFound, SunJob, SunValues, Sunlight, SunlightClass, TimeStep, UpAxis,
+    Weather, sun_positions,
 };
+use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
+use antumbra_raster::Quantity;
 use serde::Serialize;
 
 use super::chunks::{self, PartFile};
@@ -16,9 +20,10 @@ use super::command::{Bake, Head};
 use super::files::{self, Format};
 use super::ground::{self, Ground};
 use super::map::{self, Plan, Words};
+use super::raster;
 use crate::args::{Shown, SunArgs};
 use crate::exit::{Failure, say, tell};
-use crate::{input, interrupt, json};
+use crate::{input, interrupt, json, output};
 
 /// The JSON document.
 #[derive(Serialize)]
@@ -63,18 +68,45 @@ struct Baked<'a> {
 }
 
 /// Refuses outputs that cannot be made, before anything is read.
-fn check(args: &SunArgs) -> Result<(), Failure> {
+pub fn check(args: &SunArgs) -> Result<(), Failure> {
     for path in &args.output {
         if Format::of_sensors(path)? == Format::Picture && args.grid.is_none() {
             let path = path.display();
             return Err(Failure::Usage(format!("{path}: a map needs --grid")));
         }
+        let has_cells = args.grid.is_some() || args.vertices && raster::is_raster(&args.scene);
+        if Format::of_sensors(path)? == Format::Raster && !has_cells {
+            let path = path.display();
+            let reason =
+                format!("{path}: a raster needs --grid, or --cells of a scene that is one");
+            return Err(Failure::Usage(reason));
+        }
+    }
+    args.placement.check().map_err(Failure::Usage)?;
+    if args.en17037 {
+        check_day(args)?;
     }
     args.map.check()?;
     if args.epw.is_none() && !matches!(args.show, Shown::Hours | Shown::SkyView) {
         return Err(Failure::Usage("--show: irradiation needs --epw".into()));
     }
     Ok(())
+}
+
+/// Refuses times that EN 17037 does not mean.
+fn check_day(args: &SunArgs) -> Result<(), Failure> {
+    let is_day = args.from.zip(args.to).is_some_and(|(from, to)| {
+        let ends = [from, to].map(|moment| moment.unix(0.0));
+        let is_one = ends[1] - ends[0] <= 86_400.0 && (from.month, from.day) == (to.month, to.day);
+        is_one && ((2, 1)..=(3, 21)).contains(&(from.month, from.day))
+    });
+    let is_whole = args.times.hours.is_none() && args.times.months.is_none();
+    match is_day && is_whole && args.step <= 10.0 {
+        true => Ok(()),
+        false => Err(Failure::Usage(
+            "--en17037: wanted --from and --to on one day from 1 February to 21 March, and --step of at most 10".into(),
+        )),
+    }
 }
 
 /// Runs the command, or merges parts of it.
@@ -91,14 +123,21 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
         chunks: &args.chunks,
         machine: &args.machine,
         parts,
+        earth: None,
     };
-    let sensor_file = ("--sensors", args.sensors.as_deref());
+    let read = [
+        ("--sensors", args.sensors.as_deref()),
+        ("--along", args.placement.along.as_deref()),
+        ("--epw", args.epw.as_deref()),
+    ];
     let world_files = map::world_files(&args.output);
-    let world_files: Vec<_> = world_files
-        .iter()
-        .map(|path| ("the world file", Some(&**path)))
-        .collect();
-    let mut files = bake.declare(&world_files, &[sensor_file, ("--epw", args.epw.as_deref())])?;
+    let mut written = vec![("--hourly", args.hourly.as_deref())];
+    written.extend(
+        world_files
+            .iter()
+            .map(|path| ("the world file", Some(&**path))),
+    );
+    let mut files = bake.declare(&written, &read)?;
     let weather = args.epw.as_deref().map(read_weather).transpose()?;
     let when = When::new(args, weather.as_ref())?;
     let steps = when.steps(args, weather.as_ref())?;
@@ -142,6 +181,9 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     for path in &args.output {
         baked.write(path)?;
     }
+    if let Some(path) = &args.hourly {
+        baked.hourly(path)?;
+    }
     document.rays = job.rays();
     document.fill(&found.values);
     document.total_seconds = begin.elapsed().as_secs_f64();
@@ -160,16 +202,39 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     Ok(())
 }
 
-/// The sensors that the command line asks for.
+/// The sensors that the command line chooses.
 fn sensors(args: &SunArgs, ground: &Ground, up: UpAxis) -> Result<Sensors, Failure> {
-    match (&args.sensors, args.grid) {
-        (Some(path), _) => ground::sensors(path, &ground.local),
-        (None, Some(spacing)) => {
-            let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
-            ground.grid(spacing / args.units.metres(), &plan)
+    let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
+    let units = |metres: f64| metres / args.units.metres();
+    let placement = &args.placement;
+    let mut sensors = if let Some(path) = &args.sensors {
+        ground::sensors(path, ground, &plan)?
+    } else if let Some(path) = &placement.along {
+        let corners = ground::sensors(path, ground, &plan)?;
+        let spacing = units(placement.spacing.unwrap_or_default());
+        let sensors = Sensors::along_lines(&corners, spacing);
+        sensors.map_err(|error| Failure::Usage(format!("--along: {error}")))?
+    } else if let Some(spacing) = placement.surfaces {
+        let options = Placement {
+            spacing: units(spacing),
+            kinds: placement.kinds(),
+            offset: units(placement.offset),
+            storey: placement.storey_height.map(units),
+        };
+        let sensors = Sensors::on_surfaces(&ground.bvh, &ground.mesh, &options, &plan);
+        sensors.map_err(|error| Failure::Usage(format!("--surfaces: {error}")))?
+    } else if let Some(spacing) = args.grid {
+        ground.grid(units(spacing), &plan)?
+    } else {
+        Sensors::of_vertices(&ground.mesh)
+    };
+    if placement.height > 0.0 {
+        let rise = plan.up.map(|x| x * units(placement.height));
+        for point in &mut sensors.points {
+            *point = [0, 1, 2].map(|axis| (f64::from(point[axis]) + rise[axis]) as f32);
         }
-        (None, None) => Ok(Sensors::of_vertices(&ground.mesh)),
     }
+    Ok(sensors)
 }
 
 fn read_weather(path: &Path) -> Result<Weather, Failure> {
@@ -187,12 +252,24 @@ fn read_weather(path: &Path) -> Result<Weather, Failure> {
     Ok(weather)
 }
 
+/// The beginning of a year.
+fn midnight(year: i32) -> Moment {
+    Moment {
+        year,
+        month: 1,
+        day: 1,
+        seconds: 0.0,
+    }
+}
+
 /// Hours that clocks may be apart from those of the sun. Kashgar in the west of China is the farthest, with 2.9.
 const MOST_APART: f64 = 3.0;
 
 /// The place and its clocks.
 struct When {
     place: Place,
+    clock: Clock,
+    /// Hours ahead of UTC at the beginning.
     zone: f64,
 }
 
@@ -206,24 +283,27 @@ impl When {
         // Refuses places that are not on the earth, before anything is read.
         sun_positions(&place, Refraction::default(), &[]).map_err(Failure::usage)?;
         let by_longitude = (place.longitude / 15.0).round();
-        let zone = match (args.timezone, weather) {
-            (Some(zone), _) => zone,
-            (None, Some(weather)) => weather.zone,
-            (None, None) => by_longitude,
+        let clock = match (&args.times.timezone, weather) {
+            (Some(Clock::Zone(_)), Some(_)) => {
+                let reason =
+                    "--timezone: weather has clocks without summer time; give hours ahead of UTC";
+                return Err(Failure::Usage(reason.into()));
+            }
+            (Some(clock), _) => clock.clone(),
+            (None, Some(weather)) => Clock::Fixed(weather.zone),
+            (None, None) => Clock::Fixed(by_longitude),
         };
-        if !(zone.abs() <= 26.0) {
-            return Err(Failure::Usage(format!(
-                "--timezone {zone}: it must be from -26 to 26"
-            )));
-        }
-        let when = Self { place, zone };
+        // Of a time zone, in winter.
+        let january = midnight(args.from.map_or(args.year, |from| from.year));
+        let zone = clock.hours_ahead(clock.unix(&january));
+        let when = Self { place, clock, zone };
         when.warn_of_clocks();
         Ok(when)
     }
 
     /// Warns of clocks that are far from those of the sun: the time zone or the longitude is probably that of another place.
     fn warn_of_clocks(&self) {
-        let Self { place, zone } = self;
+        let Self { place, zone, .. } = self;
         let apart = zone - place.longitude / 15.0;
         // Some islands are a whole day ahead.
         let apart = apart - 24.0 * (apart / 24.0).round();
@@ -239,24 +319,31 @@ impl When {
 
     /// The steps of time that the command line asks for.
     fn steps(&self, args: &SunArgs, weather: Option<&Weather>) -> Result<Vec<TimeStep>, Failure> {
-        let midnight = |year| Moment {
-            year,
-            month: 1,
-            day: 1,
-            seconds: 0.0,
-        };
+        let seconds = 60.0 * args.step;
+        let times = &args.times;
+        if !times.at.is_empty() {
+            let steps = times.at.iter();
+            let steps = steps.map(|&at| TimeStep::around(at, &self.clock, seconds));
+            return Ok(steps.collect());
+        }
         let period = args.from.zip(args.to).map(|(from, to)| [from, to]);
-        match weather {
-            Some(weather) => Ok(weather.steps(self.zone, period)),
+        let mut steps = match weather {
+            Some(weather) => weather.steps(self.zone, period),
             None => {
                 let year = [args.year, args.year + 1].map(midnight);
-                let steps = TimeStep::regular(period.unwrap_or(year), self.zone, 60.0 * args.step);
+                let steps = TimeStep::regular(period.unwrap_or(year), &self.clock, seconds);
                 steps.map_err(|error| match error {
                     Error::NoTime => Failure::Usage("--to must lie behind --from".into()),
                     _ => Failure::Usage(format!("--step: {error}")),
-                })
+                })?
             }
+        };
+        steps.retain(|step| times.counts(step.hour(), step.begin.month));
+        if steps.is_empty() {
+            let reason = "--hours, --months: no step of time is left";
+            return Err(Failure::Usage(reason.into()));
         }
+        Ok(steps)
     }
 
     /// Sun and sky in these steps of time.
@@ -270,6 +357,10 @@ impl When {
         let orientation = Orientation::new(up, args.north).map_err(Failure::usage)?;
         let is_measured = args.epw.is_some();
         let sunlight = Sunlight::new(&self.place, steps, is_measured, patches, orientation);
+        let sunlight = sunlight.and_then(|sunlight| match args.min_elevation > 0.0 {
+            true => sunlight.above(args.min_elevation),
+            false => Ok(sunlight),
+        });
         sunlight.map_err(Failure::usage)
     }
 }
@@ -285,11 +376,36 @@ impl Baked<'_> {
             Shown::Direct => &values.direct,
             Shown::Diffuse => &values.diffuse,
             Shown::Total => {
-                total = values.total();
+                let reflected = self.reflected();
+                let add = |(row, total): (usize, f64)| {
+                    total + reflected.as_ref().map_or(0.0, |reflected| reflected[row])
+                };
+                total = values.total().into_iter().enumerate().map(add).collect();
                 &total
             }
         };
         list.iter().map(|&x| x as f32).collect()
+    }
+
+    /// Light from the ground, if it is wanted.
+    fn reflected(&self) -> Option<Vec<f64>> {
+        let Sensors {
+            points, normals, ..
+        } = self.sensors;
+        let albedo = self.args.albedo?;
+        Some(self.sunlight.reflected(albedo, normals, points.len()))
+    }
+
+    /// Name and unit of the value that colours show.
+    fn quantity(&self) -> Quantity<'static> {
+        let (name, unit) = match self.args.show {
+            Shown::Hours => ("hours", "h"),
+            Shown::SkyView => ("sky_view", ""),
+            Shown::Direct => ("direct_kwh_m2", "kWh/m2"),
+            Shown::Diffuse => ("diffuse_kwh_m2", "kWh/m2"),
+            Shown::Total => ("total_kwh_m2", "kWh/m2"),
+        };
+        Quantity { name, unit }
     }
 
     /// Writes one file.
@@ -299,14 +415,13 @@ impl Baked<'_> {
             Format::Csv => self.csv(path),
             Format::Npz => self.npz(path),
             Format::Picture => self.map(path),
+            Format::Raster => {
+                let values = (self.sensors, &self.shown()[..]);
+                let place = (self.args.raster.crs.as_ref(), self.args.units.metres());
+                raster::write(path, self.ground, values, place, (self.up, self.quantity()))
+            }
             Format::Ply | Format::Glb => {
-                let name = match self.args.show {
-                    Shown::Hours => "hours",
-                    Shown::SkyView => "sky_view",
-                    Shown::Direct => "direct_kwh_m2",
-                    Shown::Diffuse => "diffuse_kwh_m2",
-                    Shown::Total => "total_kwh_m2",
-                };
+                let name = self.quantity().name;
                 let directions = self.sunlight.patch_directions();
                 let up = directions.last().copied().unwrap_or_default();
                 let values = (name, &self.shown()[..]);
@@ -333,7 +448,11 @@ impl Baked<'_> {
             ..
         } = self.when.place;
         let zone = self.when.zone;
-        let mut subtitle = vec![map::place(latitude, longitude), format!("UTC{zone:+}")];
+        let clock = match &self.when.clock {
+            Clock::Zone(zone) => zone.iana_name().unwrap_or_default().to_owned(),
+            Clock::Fixed(_) => format!("UTC{zone:+}"),
+        };
+        let mut subtitle = vec![map::place(latitude, longitude), clock];
         if args.show != Shown::SkyView {
             subtitle.insert(0, self.period());
         }
@@ -364,6 +483,26 @@ impl Baked<'_> {
 
     /// The time that values are of, as maps write it.
     fn period(&self) -> String {
+        let times = &self.args.times;
+        if !times.at.is_empty() {
+            let moments: Vec<String> = times.at.iter().map(Moment::to_string).collect();
+            return moments.join(", ");
+        }
+        let mut period = self.whole_period();
+        if let Some([first, last]) = times.months {
+            period += &format!(", months {first} to {last}");
+        }
+        if let Some([from, to]) = times.hours {
+            period += &format!(", {from} to {to} o'clock");
+        }
+        if self.args.min_elevation > 0.0 {
+            period += &format!(", suns above {} degrees", self.args.min_elevation);
+        }
+        period
+    }
+
+    /// The time before parts of it are chosen.
+    fn whole_period(&self) -> String {
         match (self.args.from.zip(self.args.to), self.weather) {
             (Some((from, to)), _) => map::period(&from, &to),
             (None, Some(_)) => "a year of weather".to_owned(),
@@ -375,7 +514,12 @@ impl Baked<'_> {
         let (sensors, values) = (self.sensors, &self.found.values);
         let covered = self.sunlight.suns.covered;
         let months: Vec<usize> = (0..12).filter(|&month| covered[month]).collect();
-        let mut columns = vec![("hours", &values.hours), ("sky_view", &values.sky_view)];
+        let reflected = self.reflected();
+        let mut columns = vec![
+            ("hours", &values.hours),
+            ("sky_view", &values.sky_view),
+            ("sky_open", &values.sky_open),
+        ];
         // Columns of twelve values for each sensor, of which those of months with steps are written.
         let mut by_month = vec![("hours", &values.by_month)];
         if !values.direct.is_empty() {
@@ -383,6 +527,7 @@ impl Baked<'_> {
                 ("direct_kwh_m2", &values.direct),
                 ("diffuse_kwh_m2", &values.diffuse),
             ]);
+            columns.extend(reflected.iter().map(|list| ("reflected_kwh_m2", list)));
             by_month.extend([
                 ("direct_kwh_m2", &values.direct_by_month),
                 ("diffuse_kwh_m2", &values.diffuse_by_month),
@@ -399,13 +544,64 @@ impl Baked<'_> {
         let room = 10 * (12 + (by_month.len() * months.len()) as u64);
         let head = (&head.join(",")[..], room);
         let points = (&sensors.points[..], self.ground.local);
-        files::table(path, points, &sensors.normals, head, |row| {
+        let mut labels = sensors.labels.clone();
+        if self.args.en17037 {
+            let class = |&hours: &f64| SunlightClass::of_hours(hours).name().to_owned();
+            labels.push(Label {
+                column: "en17037".into(),
+                values: values.hours.iter().map(class).collect(),
+            });
+        }
+        files::table(path, points, (&sensors.normals, &labels), head, |row| {
             let mut numbers: Vec<f64> = columns.iter().map(|(_, list)| list[row]).collect();
             for (_, list) in &by_month {
                 numbers.extend(months.iter().map(|month| list[12 * row + month]));
             }
             numbers
         })
+    }
+
+    /// Writes a line for each step of time, with a column for each sensor.
+    fn hourly(&self, path: &Path) -> Result<(), Failure> {
+        let _writing = interrupt::writing();
+        Format::of(path, &["csv"], "steps of time are written as csv")?;
+        let (sensors, found) = (self.sensors, self.found);
+        let hourly = Hourly::new(self.sunlight)?;
+        let cells = hourly.len() as u64 * sensors.points.len() as u64;
+        output::check_room(path, 4 * cells)?;
+        Ok(atomic_write(path, |file| {
+            let names = sensors.labels.iter().find(|label| label.column == "name");
+            let mut line = "time".to_owned();
+            for row in 0..sensors.points.len() {
+                let _ = match names {
+                    Some(names) => write!(line, ",{}", files::field(&names.values[row])),
+                    None => write!(line, ",{}", row + 1),
+                };
+            }
+            writeln!(file, "{line}")?;
+            for step in 0..hourly.len() {
+                line.clear();
+                let _ = write!(line, "{}", hourly.begin(step));
+                for row in 0..sensors.points.len() {
+                    let seen = (&found.suns_seen, &found.sky_seen, row);
+                    let normal = sensors.normals.get(row).copied();
+                    let value =
+                        hourly
+                            .receipt(step, seen, normal)
+                            .map(|receipt| match self.args.show {
+                                Shown::Hours => receipt.hours,
+                                Shown::Direct => receipt.direct,
+                                Shown::Diffuse => receipt.diffuse,
+                                Shown::Total => receipt.direct + receipt.diffuse,
+                                Shown::SkyView => found.values.sky_view[row],
+                            });
+                    let value = value.unwrap_or(f64::NAN);
+                    let _ = write!(line, ",{}", (value * 1e6).round() / 1e6);
+                }
+                writeln!(file, "{line}")?;
+            }
+            Ok(())
+        })?)
     }
 
     fn npz(&self, path: &Path) -> Result<(), Failure> {
@@ -423,6 +619,7 @@ impl Baked<'_> {
             Entry::new("hours", Array::F64(&values.hours)),
             Entry::new("hours_by_month", Array::F64(&values.by_month)).columns(12),
             Entry::new("sky_view", Array::F64(&values.sky_view)),
+            Entry::new("sky_open", Array::F64(&values.sky_open)),
             Entry::new("suns_seen", Array::Bits(suns_seen)),
             Entry::new("patches_seen", Array::Bits(sky_seen)),
             Entry::new("suns_and_patches", Array::Counts(&counts)),

@@ -7,13 +7,15 @@ use antumbra_bake::{Array, BitMatrix, Entry, Eyes, Orientation, Sensors, Visibil
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
+use antumbra_raster::Quantity;
 use serde::Serialize;
 
 use super::chunks::{self, PartFile};
 use super::command::{Bake, Head, text};
 use super::files::{self, Format};
-use super::ground::{self, Ground};
+use super::ground::{self, Earth, Ground};
 use super::map::{self, Plan, Words};
+use super::raster;
 use crate::args::VisibleArgs;
 use crate::exit::{Failure, tell};
 use crate::{interrupt, json, output};
@@ -40,11 +42,19 @@ struct Document<'a> {
 }
 
 /// Refuses outputs that cannot be made, before anything is read.
-fn check(args: &VisibleArgs) -> Result<(), Failure> {
+pub fn check(args: &VisibleArgs) -> Result<(), Failure> {
     for path in &args.output {
         if Format::of_sensors(path)? == Format::Picture && args.grid.is_none() {
             let path = path.display();
             let reason = format!("{path}: a map needs --viewshed with --grid");
+            return Err(Failure::Usage(reason));
+        }
+        let has_cells = args.viewshed && (args.grid.is_some() || raster::is_raster(&args.scene));
+        if Format::of_sensors(path)? == Format::Raster && !has_cells {
+            let path = path.display();
+            let reason = format!(
+                "{path}: a raster needs --viewshed, with --grid or of a scene that is a raster"
+            );
             return Err(Failure::Usage(reason));
         }
     }
@@ -70,13 +80,20 @@ struct Points {
 
 impl Points {
     fn read(args: &VisibleArgs, ground: &Ground, plan: &Orientation) -> Result<Self, Failure> {
-        let from = ground::sensors(&args.from, &ground.local)?;
+        let from = ground::sensors(&args.from, ground, plan)?;
         let (rows, columns) = match (args.viewshed, args.grid) {
             (true, Some(spacing)) => (ground.grid(spacing, plan)?, Some(from)),
-            (true, None) => (Sensors::of_vertices(&ground.mesh), Some(from)),
+            (true, None) => {
+                let mut places = Sensors::of_vertices(&ground.mesh);
+                // Cells count as seen where a line ends, and not only from above the slope there.
+                if ground.loaded.raster.is_some() {
+                    places.normals = Vec::new();
+                }
+                (places, Some(from))
+            }
             (false, _) => {
                 let to = args.to.as_deref();
-                let to = to.map(|path| ground::sensors(path, &ground.local));
+                let to = to.map(|path| ground::sensors(path, ground, plan));
                 (from, to.transpose()?)
             }
         };
@@ -121,6 +138,24 @@ impl Points {
         }
     }
 
+    /// The points as they are in the scene.
+    fn unbent(&self, ground: &Ground) -> Self {
+        let unbend = |sensors: &Sensors| {
+            let mut sensors = sensors.clone();
+            if let Some(curvature) = &ground.curvature {
+                for point in &mut sensors.points {
+                    *point = curvature.unbend(*point);
+                }
+            }
+            sensors
+        };
+        Self {
+            rows: unbend(&self.rows),
+            columns: self.columns.as_ref().map(unbend),
+            is_viewshed: self.is_viewshed,
+        }
+    }
+
     /// Eyes of the rows, and of the columns.
     fn eyes(
         &self,
@@ -157,6 +192,11 @@ pub fn run(
         chunks: &args.chunks,
         machine: &args.machine,
         parts,
+        earth: args.curvature.then(|| Earth {
+            radius: args.earth_radius / args.units.metres(),
+            refraction: args.refraction,
+            up: args.up,
+        }),
     };
     let from = ("the points", Some(args.from.as_path()));
     let to = ("the points", args.to.as_deref());
@@ -178,6 +218,7 @@ pub fn run(
         rows: &rows,
         columns: columns.as_ref(),
         margin: args.margin.map(|margin| margin as f32),
+        range: args.radius.map(|radius| (radius, plan.up)),
     };
     let done = bake.compute(&job, &ground, &ground.bvh)?;
     let counts = [
@@ -214,6 +255,7 @@ pub fn run(
         tell(format_args!("wrote {outputs}, for merge"));
         return Ok(());
     };
+    let points = points.unbent(&ground);
     let grid = Plan {
         ground: &ground,
         orientation: &plan,
@@ -225,7 +267,7 @@ pub fn run(
     write(args, &grid, &points, &matrix)?;
     if let Some(path) = &args.lines {
         let _writing = interrupt::writing();
-        lines(path, (args.viewshed, ground.local), &job, &matrix)?;
+        lines(path, (args.viewshed, &ground), &job, &matrix)?;
     }
     document.fill(matrix.count());
     json::write(&document, args.json.as_ref())?;
@@ -254,9 +296,17 @@ fn write(
     let (rows, local) = (&points.rows, ground.local);
     let each = |path: &PathBuf| match Format::of_sensors(path)? {
         Format::Npz => npz(path, points, local, matrix, &counts),
-        Format::Csv => files::table(path, (&rows.points, local), &[], (name, 40), |row| {
-            vec![counts[row] as f64]
-        }),
+        Format::Csv => {
+            let labels = (&[][..], &rows.labels[..]);
+            files::table(path, (&rows.points, local), labels, (name, 40), |row| {
+                vec![counts[row] as f64]
+            })
+        }
+        Format::Raster => {
+            let quantity = Quantity { name, unit: "" };
+            let crs = (args.raster.crs.as_ref(), 1.0);
+            raster::write(path, ground, (rows, &values()), crs, (plan.up, quantity))
+        }
         Format::Picture => {
             let observers = points.columns.as_ref().unwrap_or(rows).points.len();
             let words = Words {
@@ -311,11 +361,12 @@ fn npz(
 /// Writes the pairs that see each other; of points of one list, each pair once.
 fn lines(
     path: &Path,
-    (is_viewshed, local): (bool, LocalOrigin),
+    (is_viewshed, ground): (bool, &Ground),
     job: &VisibilityJob<'_>,
     matrix: &BitMatrix,
 ) -> Result<(), Failure> {
     let once = job.columns.is_none();
+    let local = ground.local;
     let pairs = || {
         (0..matrix.rows()).flat_map(move |row| {
             let columns = ones(matrix.row(row)).filter(move |&column| !once || column > row);
@@ -348,6 +399,8 @@ fn lines(
              property int vertex1\nproperty int vertex2\nend_header\n"
         )?;
         for point in rows.iter().chain(columns) {
+            let unbent = ground.curvature.map(|curvature| curvature.unbend(*point));
+            let point = &unbent.unwrap_or(*point);
             match is_local {
                 true => file.write_all(local.world(*point).map(f64::to_le_bytes).as_flattened())?,
                 false => file.write_all(point.map(f32::to_le_bytes).as_flattened())?,

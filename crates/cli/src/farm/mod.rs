@@ -1,6 +1,6 @@
-//! `antumbra farm`: a picture made by the machines of a scheduler that exists already.
+//! `antumbra farm`: a picture or a bake made by the machines of a scheduler that exists already.
 //!
-//! Every task renders one shard of the picture, and a last one merges them. The scheduler does the rest: it opens
+//! Every task computes one shard, and a last one merges them. The scheduler does the rest: it opens
 //! connections, moves files, starts tasks again; this program writes what it is to be told.
 //!
 //! - `slurm`: an array job and a dependent one, submitted
@@ -9,12 +9,14 @@
 mod openjd;
 mod slurm;
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Parser;
 use serde::{Deserialize, Serialize};
 
-use crate::args::{Cli, Command, FarmArgs, FarmCommand};
+use crate::args::{Cli, Command, FarmArgs, FarmCommand, FarmJob};
+use crate::bake::{ao, sun, visible};
 use crate::exit::Failure;
 use crate::output::{self, Files};
 use crate::render::check_image_names;
@@ -31,20 +33,43 @@ pub fn run(command: &FarmCommand) -> Result<(), Failure> {
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Plan {
     program: String,
+    /// Name of the command of every task.
+    #[serde(default = "render")]
+    command: String,
     scene: String,
     output: String,
+    /// Further outputs of a bake.
+    #[serde(default)]
+    more_outputs: Vec<String>,
     stderr_image: Option<String>,
     /// Where parts, scripts and logs go.
     folder: String,
     tasks: u32,
-    /// Further flags of `render`.
+    /// Further arguments of the command.
     flags: Vec<String>,
+}
+
+/// The command of plans that name none.
+fn render() -> String {
+    FarmJob::Render.name().to_owned()
 }
 
 impl Plan {
     fn new(args: &FarmArgs) -> Result<Self, Failure> {
-        check_image_names(Some(&args.output), args.stderr_image.as_deref())?;
-        check_flags(args)?;
+        let Some((output, more)) = args.output.split_first() else {
+            return Err(Failure::Usage("--output is missing".into()));
+        };
+        match args.job {
+            FarmJob::Render => {
+                check_image_names(Some(output), args.stderr_image.as_deref())?;
+                if !more.is_empty() {
+                    let reason = "--output: render writes one image";
+                    return Err(Failure::Usage(reason.into()));
+                }
+                check_flags(args)?;
+            }
+            _ => check_bake(args)?,
+        }
         let program = match &args.program {
             Some(path) => path.clone(),
             None => std::env::current_exe()
@@ -53,7 +78,7 @@ impl Plan {
         let folder = match &args.folder {
             Some(path) => path.clone(),
             None => {
-                let mut name = args.output.clone().into_os_string();
+                let mut name = output.clone().into_os_string();
                 name.push(".farm");
                 name.into()
             }
@@ -68,8 +93,13 @@ impl Plan {
         };
         Ok(Self {
             program: text(&program)?,
+            command: args.job.name().to_owned(),
             scene,
-            output: absolute(&args.output)?,
+            output: absolute(output)?,
+            more_outputs: more
+                .iter()
+                .map(|path| absolute(path))
+                .collect::<Result<_, _>>()?,
             stderr_image: args.stderr_image.as_deref().map(absolute).transpose()?,
             folder: absolute(&folder)?,
             tasks: args.tasks,
@@ -82,6 +112,9 @@ impl Plan {
         let mut files = Files::default();
         files.reads("the scene", Path::new(&self.scene))?;
         files.writes("--output", Path::new(&self.output))?;
+        for path in &self.more_outputs {
+            files.writes("--output", Path::new(path))?;
+        }
         if let Some(path) = &self.stderr_image {
             files.writes("--stderr-image", Path::new(path))?;
         }
@@ -105,11 +138,29 @@ impl Plan {
         Ok(())
     }
 
-    /// Arguments of `render` for the shard that `task` stands for.
-    fn render_args(&self, scene: &str, folder: &str, task: &str) -> Vec<String> {
-        let mut args: Vec<String> = ["render", scene, "--resume"].map(Into::into).into();
+    /// All outputs.
+    fn outputs(&self) -> Vec<String> {
+        let first = std::iter::once(&self.output);
+        first.chain(&self.more_outputs).cloned().collect()
+    }
+
+    /// Whether tasks are those of a bake, which keep unfinished work in the part itself, and not of a picture.
+    fn is_bake(&self) -> bool {
+        self.command != FarmJob::Render.name()
+    }
+
+    /// Arguments of the command for the shard that `task` stands for, with the part to write.
+    fn task_args(&self, scene: &str, folder: &str, (task, part): (&str, &str)) -> Vec<String> {
+        let mut args: Vec<String> = vec![self.command.clone(), scene.into()];
+        if self.is_bake() {
+            args.extend(self.flags.iter().cloned());
+            args.extend(["--shard".into(), format!("{task}/{}", self.tasks)]);
+            args.extend(["-o".into(), format!("{folder}/{part}")]);
+            return args;
+        }
+        args.push("--resume".into());
         args.extend(["--shard".into(), format!("{task}/{}", self.tasks)]);
-        args.extend(["-o".into(), format!("{folder}/{task}.part")]);
+        args.extend(["-o".into(), format!("{folder}/{part}")]);
         if self.stderr_image.is_some() {
             args.extend([
                 "--stderr-image".into(),
@@ -121,14 +172,57 @@ impl Plan {
     }
 
     /// Arguments of `merge`.
-    fn merge_args(&self, folder: &str, output: &str, errors: Option<&str>) -> Vec<String> {
+    fn merge_args(&self, folder: &str, outputs: &[String], errors: Option<&str>) -> Vec<String> {
         let mut args = vec!["merge".to_owned()];
         args.extend((0..self.tasks).map(|task| format!("{folder}/{task}.part")));
-        args.extend(["-o".into(), output.into()]);
+        for output in outputs {
+            args.extend(["-o".into(), output.clone()]);
+        }
         if let Some(path) = errors {
             args.extend(["--stderr-image".into(), path.into()]);
         }
         args
+    }
+}
+
+/// Refuses arguments that the command of a bake does not know or that cannot make the outputs, before a hundred machines do.
+fn check_bake(args: &FarmArgs) -> Result<(), Failure> {
+    if args.stderr_image.is_some() {
+        let reason = "--stderr-image: only pictures have standard errors";
+        return Err(Failure::Usage(reason.into()));
+    }
+    let parse = |more: &[OsString]| {
+        let line = ["antumbra", args.job.name()].map(OsString::from);
+        let line = line.into_iter().chain([args.scene.clone().into()]);
+        let line = line.chain(args.flags.iter().map(Into::into));
+        let cli = Cli::try_parse_from(line.chain(more.iter().cloned()));
+        cli.map_err(|error| Failure::Usage(error.to_string()))
+    };
+    // As the tasks are, with flags that are ours to set.
+    let task = ["-o", "0.part", "--shard", "0/1"].map(OsString::from);
+    let (outputs, json) = match parse(&task)?.command {
+        Some(Command::Ao(bake)) => (1, bake.json),
+        Some(Command::Sun(bake)) => (bake.output.len(), bake.json),
+        Some(Command::Visible(bake)) => (bake.output.len(), bake.json),
+        _ => {
+            return Err(Failure::Usage(
+                "flags after -- are those of the command".into(),
+            ));
+        }
+    };
+    if outputs != 1 || json.is_some() {
+        let reason = "--output goes before --, and --json with `merge`";
+        return Err(Failure::Usage(reason.into()));
+    }
+    let mut whole = Vec::new();
+    for path in &args.output {
+        whole.extend(["-o".into(), path.clone().into_os_string()]);
+    }
+    match parse(&whole)?.command {
+        Some(Command::Ao(bake)) => ao::check(&bake).map(drop),
+        Some(Command::Sun(bake)) => sun::check(&bake),
+        Some(Command::Visible(bake)) => visible::check(&bake),
+        _ => Ok(()),
     }
 }
 

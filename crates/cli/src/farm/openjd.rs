@@ -41,8 +41,10 @@ pub fn run(args: &OpenjdArgs) -> Result<(), Failure> {
 fn check_texts(plan: &Plan) -> Result<(), Failure> {
     let Plan {
         program,
+        command: _,
         scene,
         output,
+        more_outputs,
         stderr_image,
         folder,
         tasks: _,
@@ -54,7 +56,7 @@ fn check_texts(plan: &Plan) -> Result<(), Failure> {
         )));
     }
     let paths = [program, scene, output, folder].into_iter();
-    let mut texts = paths.chain(stderr_image).chain(flags);
+    let mut texts = paths.chain(more_outputs).chain(stderr_image).chain(flags);
     match texts.find(|text| text.contains(char::is_control)) {
         Some(text) => Err(Failure::Usage(format!(
             "{text:?}: control characters cannot stand in a template"
@@ -103,23 +105,33 @@ fn template(plan: &Plan, built_in: bool, directory: &Path) -> Value {
         parameters.push(path("StderrImage", "FILE", "OUT", image));
         "{{Param.StderrImage}}"
     });
+    let mut outputs = vec!["{{Param.Output}}".to_owned()];
+    for (index, output) in plan.more_outputs.iter().enumerate() {
+        let name = format!("Output{}", index + 2);
+        parameters.push(path(&name, "FILE", "OUT", output));
+        outputs.push(format!("{{{{Param.{name}}}}}"));
+    }
+    let (step, description) = match plan.is_bake() {
+        true => ("Compute", "Computes shards of a job and merges them."),
+        false => ("Render", "Renders shards of a picture and merges them."),
+    };
     json!({
         "specificationVersion": "jobtemplate-2023-09",
         "name": "antumbra",
-        "description": "Renders shards of a picture and merges them. A task that is started again goes on from its checkpoint.",
+        "description": format!("{description} A task that is started again goes on from its checkpoint."),
         "parameterDefinitions": parameters,
         "steps": [
             {
-                "name": "Render",
+                "name": step,
                 "parameterSpace": { "taskParameterDefinitions": [
                     { "name": "Shard", "type": "INT", "range": format!("0-{}", plan.tasks - 1) },
                 ] },
-                "script": action(plan.render_args("{{Param.Scene}}", folder, task)),
+                "script": action(plan.task_args("{{Param.Scene}}", folder, (task, &format!("{task}.part")))),
             },
             {
                 "name": "Merge",
-                "dependencies": [{ "dependsOn": "Render" }],
-                "script": action(plan.merge_args(folder, "{{Param.Output}}", errors)),
+                "dependencies": [{ "dependsOn": step }],
+                "script": action(plan.merge_args(folder, &outputs, errors)),
             },
         ],
     })

@@ -138,7 +138,22 @@ impl Scripts {
         // Before what was asked for, which may say otherwise.
         options.insert(0, format!("--signal=B:USR2@{}", args.grace));
         let task = "\"$SLURM_ARRAY_TASK_ID\"";
-        let call = call(plan, &plan.render_args(&plan.scene, folder, TASK))?.replace(TASK, task);
+        // A part of a bake grows in its file, and has its name when it is complete.
+        let [unfinished, done] = ["unfinished.part", "part"].map(|end| format!("{TASK}.{end}"));
+        let (part, finish) = match plan.is_bake() {
+            true => {
+                let path = |name: &str| format!("{}/{name}", folder);
+                let [from, to] = [path(&unfinished), path(&done)].map(|path| {
+                    let pieces: Result<Vec<_>, _> = path.split(TASK).map(quote_piece).collect();
+                    Ok::<_, Failure>(pieces?.join(task))
+                });
+                let finish = format!("if [ \"$code\" = 0 ]; then mv {} {}; fi\n", from?, to?);
+                (unfinished, finish)
+            }
+            false => (done, String::new()),
+        };
+        let args = plan.task_args(&plan.scene, folder, (TASK, &part));
+        let call = call(plan, &args)?.replace(TASK, task);
         let threads = if plan.flags.iter().any(|flag| flag.starts_with("--threads")) {
             ""
         } else {
@@ -146,7 +161,7 @@ impl Scripts {
         };
         Ok(format!(
             r#"#!/usr/bin/env bash
-# Renders one part of {output}.
+# Computes one part of {output}.
 {header}
 {log}set -u
 requeue=
@@ -162,7 +177,7 @@ while kill -0 "$render" 2>/dev/null; do
     wait "$render"
     code=$?
 done
-if [ -n "$requeue" ] && {{ [ "$code" = 75 ] || [ "$code" = 130 ]; }}; then
+{finish}if [ -n "$requeue" ] && {{ [ "$code" = 75 ] || [ "$code" = 130 ]; }}; then
     scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID"
 fi
 exit "$code"
@@ -179,7 +194,7 @@ exit "$code"
         let quoted = quote(folder)?;
         Ok(format!(
             r#"#!/usr/bin/env bash
-# Merges the parts of {output}; those that are missing are rendered first.
+# Merges the parts of {output}; those that are missing are computed first.
 {header}
 {log}set -u
 missing=()
@@ -206,7 +221,7 @@ exec {call}
             attempts = args.attempts,
             call = call(
                 plan,
-                &plan.merge_args(folder, &plan.output, plan.stderr_image.as_deref())
+                &plan.merge_args(folder, &plan.outputs(), plan.stderr_image.as_deref())
             )?,
         ))
     }

@@ -214,3 +214,87 @@ fn a_job_given_again_submits_what_is_missing() {
     let (code, told) = submit("4");
     assert!(code == Some(2) && told.contains("another job"), "{told}");
 }
+
+#[test]
+fn a_bake_on_many_machines_has_the_same_bytes() {
+    let place = Place::with_room();
+    let flags = [
+        "--vertices",
+        "--lat",
+        "48",
+        "--lon",
+        "11",
+        "--up",
+        "z",
+        "--step",
+        "5",
+    ];
+    let day = ["--from", "2025-06-21", "--to", "2025-06-21"];
+    let flags = [&flags[..], &day].concat();
+    let scene = ["sun", "builtin:city:2000", "-o", "one.csv", "-o", "one.npz"];
+    place.run(&[&scene[..], &flags].concat()).expect(0);
+    let program = env!("CARGO_BIN_EXE_antumbra");
+    let farm = [
+        "builtin:city:2000",
+        "--command",
+        "sun",
+        "-o",
+        "all.csv",
+        "-o",
+        "all.npz",
+    ];
+    let tasks = ["--tasks", "3", "--folder", "parts", "--program", program];
+    let slurm = [
+        &["farm", "slurm"],
+        &farm[..],
+        &tasks,
+        &["--dry-run", "--"],
+        &flags,
+    ]
+    .concat();
+    let printed = place.run(&slurm).expect(0).stdout;
+    let scripts: Vec<_> = printed.split("#!/usr/bin/env bash").skip(1).collect();
+    let [compute, merge] = scripts[..] else {
+        panic!("two scripts: {printed}");
+    };
+    let (compute, _) = compute.rsplit_once("\n# ").expect("a comment");
+    let (merge, _) = merge.split_once("\nsbatch ").expect("a command");
+    fs::create_dir(place.path("parts")).expect("a folder");
+    let bash = |script: &str, task: &str| {
+        let bash = Command::new("bash")
+            .args(["-c", script])
+            .current_dir(place.path("."))
+            .env("SLURM_ARRAY_TASK_ID", task)
+            .status();
+        assert!(bash.expect("bash").success(), "{script}");
+    };
+    // The machine of a task was lost in the middle of its work.
+    bash(compute, "1");
+    let part = fs::read(place.path("parts/1.part")).expect("a part");
+    fs::remove_file(place.path("parts/1.part")).expect("a file");
+    place.write("parts/1.unfinished.part", &part[..part.len() / 2]);
+    for task in ["0", "1", "2"] {
+        bash(compute, task);
+    }
+    bash(merge, "");
+    for end in ["csv", "npz"] {
+        let [one, all] = ["one", "all"].map(|name| fs::read(place.path(&format!("{name}.{end}"))));
+        assert_eq!(one.expect("a file"), all.expect("a file"), "{end}");
+    }
+    let openjd = [&["farm", "openjd"], &farm[..], &tasks, &["--"], &flags].concat();
+    let template = place.run(&openjd).expect(0).json();
+    let args = &template["steps"][0]["script"]["actions"]["onRun"]["args"];
+    assert_eq!(args[0], "sun");
+    assert_eq!(args[15], "--shard");
+    let merge = &template["steps"][1]["script"]["actions"]["onRun"]["args"];
+    assert_eq!(merge[7], "{{Param.Output2}}");
+    for (bad, word) in [
+        (["--", "--no-such", "1"], "--no-such"),
+        (["--", "--output", "a.csv"], "before --"),
+        (["--", "--show", "direct"], "--epw"),
+    ] {
+        let run =
+            place.run(&[&["farm", "slurm"], &farm[..], &["--dry-run"], &bad, &flags].concat());
+        assert!(run.code == 2 && run.stderr.contains(word), "{}", run.stderr);
+    }
+}

@@ -14,6 +14,7 @@
 //! - `describing`: `info`
 //! - `looking`: viewers, what is said meanwhile, and the standard input
 //! - `occlusion`: `ao`;  `sunlight`: `sun`;  `sight`: `visible`
+//! - `terrain`: height rasters and viewsheds;  `placing`: sensors on surfaces, and times of `sun`
 //! - `book`: links, tables and code of the pages for readers
 //! - `looks`: meshes with materials, camera flags, layers, pictures for displays
 //! - `cameras`: cameras in `info` and `ao`, and light from images around a mesh
@@ -34,6 +35,7 @@ mod looking;
 mod looks;
 mod occlusion;
 mod outputs;
+mod placing;
 mod rendering;
 mod resuming;
 mod sight;
@@ -42,4 +44,5 @@ mod studying;
 mod sunlight;
 mod support;
 mod telling;
+mod terrain;
 mod usage;

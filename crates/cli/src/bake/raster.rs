@@ -1,0 +1,71 @@
+//! Rasters of results: values of the cells of a height raster, or of a grid, with their place on the map.
+
+use std::path::Path;
+
+use antumbra_bake::{Layout, Orientation, Sensors, UpAxis};
+use antumbra_image::atomic_write;
+use antumbra_raster::{Crs, EXTENSIONS, Grid, Quantity, RasterCells};
+
+use super::ground::Ground;
+use crate::exit::Failure;
+use crate::output;
+
+/// Whether a scene is a height raster, by its name.
+pub fn is_raster(scene: &Path) -> bool {
+    let extension = scene.extension().unwrap_or_default();
+    EXTENSIONS
+        .iter()
+        .any(|known| extension.eq_ignore_ascii_case(known))
+}
+
+/// Writes values of sensors, which are the vertices of a height raster or the cells of a grid. Coordinates of the scene are
+/// multiplied by `metres` where the scene has no raster.
+pub fn write(
+    path: &Path,
+    ground: &Ground,
+    (sensors, values): (&Sensors, &[f32]),
+    (crs, metres): (Option<&Crs>, f64),
+    (up, quantity): (UpAxis, Quantity<'_>),
+) -> Result<(), Failure> {
+    let mut all = match (&sensors.layout, &ground.loaded.raster) {
+        (Layout::Vertices, Some(cells)) => RasterCells::clone(cells),
+        (Layout::Grid(grid), _) => {
+            let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
+            let origin = plan.local(ground.local.origin);
+            let corner = [0, 1].map(|axis| metres * (origin[axis] + grid.corner[axis]));
+            let size = [grid.width, grid.height];
+            let mut known = Grid::north_up(size, corner, metres * grid.spacing);
+            known.crs = ground
+                .loaded
+                .raster
+                .as_ref()
+                .and_then(|raster| raster.grid.crs.clone());
+            RasterCells {
+                grid: known,
+                cells: grid.cells.clone(),
+            }
+        }
+        _ => {
+            let path = path.display();
+            let reason = format!("{path}: a raster needs --grid, or a scene that is a raster");
+            return Err(Failure::Usage(reason));
+        }
+    };
+    if let Some(crs) = crs {
+        all.grid.crs = Some(crs.clone());
+    }
+    write_cells(path, &all, values, quantity)
+}
+
+/// Writes values of the vertices of a height raster.
+pub fn write_cells(
+    path: &Path,
+    all: &RasterCells,
+    values: &[f32],
+    quantity: Quantity<'_>,
+) -> Result<(), Failure> {
+    let bytes = antumbra_raster::write(path, &all.grid, &all.spread(values), quantity);
+    let bytes = bytes.map_err(|error| Failure::Usage(error.to_string()))?;
+    output::check_room(path, bytes.len() as u64)?;
+    Ok(atomic_write(path, |file| file.write_all(&bytes))?)
+}

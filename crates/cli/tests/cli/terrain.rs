@@ -1,0 +1,185 @@
+//! Height rasters: read as meshes, results with the same georeference, viewsheds over a round earth.
+
+use std::fs;
+
+use antumbra_raster::{Crs, Grid, Quantity, Raster, read, write};
+
+use crate::support::Place;
+
+/// A plain of 40 x 30 cells of 10 m in map coordinates, with a wall along column 20 and a hole in a corner.
+fn plain() -> (Grid, Vec<f32>) {
+    let mut grid = Grid::north_up([40, 30], [600_000.0, 5_340_000.0], 10.0);
+    grid.crs = Some(Crs::from_epsg(25_832).expect("a code"));
+    let height = |cell: usize| match (cell % 40, cell / 40) {
+        (0, 0) => f32::NAN,
+        (20, _) => 30.0,
+        _ => 5.0,
+    };
+    let heights = (0..40 * 30).map(height).collect();
+    (grid, heights)
+}
+
+fn place() -> Place {
+    let place = Place::empty();
+    let (grid, heights) = plain();
+    let quantity = Quantity {
+        name: "height",
+        unit: "m",
+    };
+    let bytes = write("dem.tif".as_ref(), &grid, &heights, quantity).expect("a raster");
+    place.write("dem.tif", bytes);
+    let bytes = write("dem.asc".as_ref(), &grid, &heights, quantity).expect("a raster");
+    place.write("dem.asc", bytes);
+    place
+}
+
+impl Place {
+    fn raster(&self, name: &str) -> Raster {
+        read(&self.path(name), u64::MAX).expect("a raster")
+    }
+}
+
+const SUN: [&str; 8] = [
+    "--lat",
+    "48.2",
+    "--lon",
+    "10.3",
+    "--from",
+    "2025-06-21",
+    "--to",
+    "2025-06-21",
+];
+
+#[test]
+fn results_are_where_the_heights_were() {
+    let place = place();
+    let args = [
+        "sun", "dem.tif", "--cells", "-o", "sun.tif", "-o", "sun.asc", "-o", "sun.csv",
+    ];
+    place.run(&[&args[..], &SUN].concat()).expect(0);
+    let found = place.raster("sun.tif");
+    assert_eq!(found.grid, plain().0);
+    assert!(found.values[0].is_nan());
+    let at = |column: usize, row: usize| found.values[40 * row + column];
+    assert!(
+        at(19, 15) < at(10, 15) && at(21, 15) < at(35, 15),
+        "the wall takes sun"
+    );
+    assert!((at(2, 15) - at(37, 15)).abs() <= 4.0);
+    assert_eq!(place.raster("sun.asc").values.len(), found.values.len());
+    // The same places in a table.
+    let table = fs::read_to_string(place.path("sun.csv")).expect("a table");
+    let first: Vec<f64> = (table.lines().nth(1).expect("a line").split(','))
+        .map(|x| x.parse().expect("a number"))
+        .collect();
+    assert_eq!(first[..3], [600_015.0, 5_339_995.0, 5.0]);
+    assert!((first[6] - found.values[1]).abs() < 1e-6);
+    place
+        .run(&["ao", "dem.asc", "-o", "ao.tif", "--samples", "16"])
+        .expect(0);
+    let open = place.raster("ao.tif");
+    assert!(open.grid.crs.is_none() && open.grid.transform == found.grid.transform);
+    assert!(open.values[40 * 15 + 20] > open.values[40 * 15 + 19]);
+}
+
+#[test]
+fn a_grid_on_a_mesh_is_a_raster() {
+    let place = place();
+    place.write(
+        "square.obj",
+        "v 600000 5340000 0\nv 600040 5340000 0\nv 600040 5340030 0\nv 600000 5340030 0\nf 1 2 3 4\n",
+    );
+    let args = [
+        "sun",
+        "square.obj",
+        "--grid",
+        "10",
+        "-o",
+        "sun.tif",
+        "--crs",
+        "EPSG:25832",
+    ];
+    place.run(&[&args[..], &SUN].concat()).expect(0);
+    let found = place.raster("sun.tif");
+    let mut wanted = Grid::north_up([4, 3], [600_000.0, 5_340_030.0], 10.0);
+    wanted.crs = Some(Crs::from_epsg(25_832).expect("a code"));
+    assert_eq!(found.grid, wanted);
+    assert!(found.values.iter().all(|x| *x > 10.0));
+}
+
+#[test]
+fn a_viewshed_ends_at_the_wall_and_at_the_radius() {
+    let place = place();
+    // Without heights: on the surface. Two observers west of the wall, one east of it.
+    place.write(
+        "eyes.csv",
+        "name,x,y\na,600055,5339855\nb,600105,5339855\nc,600305,5339855\n",
+    );
+    let args = [
+        "visible",
+        "dem.tif",
+        "eyes.csv",
+        "--viewshed",
+        "--eye",
+        "2",
+        "-o",
+        "seen.tif",
+    ];
+    place.run(&args).expect(0);
+    let seen = place.raster("seen.tif");
+    let at = |column: usize| seen.values[40 * 14 + column];
+    assert_eq!(
+        [at(2), at(12), at(20), at(21), at(38)],
+        [2.0, 2.0, 3.0, 1.0, 1.0]
+    );
+    place
+        .run(&[&args[..], &["--radius", "60", "--curvature"]].concat())
+        .expect(0);
+    let near = place.raster("seen.tif");
+    let at = |column: usize| near.values[40 * 14 + column];
+    assert_eq!(
+        [at(0), at(8), at(15), at(17), at(25), at(37)],
+        [1.0, 2.0, 1.0, 0.0, 1.0, 0.0]
+    );
+}
+
+#[test]
+fn what_cannot_be_placed_is_refused() {
+    let place = place();
+    place.write("off.csv", "x,y\n0,0\n");
+    place.write("plain.npy", b"\x93NUMPY\x01\x00");
+    for (args, word) in [
+        (
+            &["visible", "dem.tif", "off.csv", "--viewshed", "-o", "a.csv"][..],
+            "point 1",
+        ),
+        (&["ao", "plain.npy", "-o", "a.ply"], "no .npy"),
+        (
+            &["ao", "builtin:city", "-o", "a.tif"],
+            "needs a scene that is one",
+        ),
+        (
+            &[
+                "sun",
+                "dem.tif",
+                "--cells",
+                "-o",
+                "a.tif",
+                "--crs",
+                "EPSG:4326",
+                "--lat",
+                "1",
+                "--lon",
+                "1",
+            ],
+            "degrees",
+        ),
+    ] {
+        let run = place.run(args);
+        assert!(
+            run.code != 0 && run.stderr.contains(word),
+            "{args:?}: {}",
+            run.stderr
+        );
+    }
+}
