@@ -1,4 +1,4 @@
-//! Clocks: so many hours ahead of UTC, or those of a time zone with its summer time.
+//! Clocks: a fixed number of hours ahead of UTC, or a time zone with its summer time.
 
 use jiff::Timestamp;
 use jiff::civil::date;

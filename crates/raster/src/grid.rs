@@ -26,7 +26,7 @@ pub struct RasterCells {
 }
 
 impl RasterCells {
-    /// Values of vertices as those of all cells; NaN where a cell has no data.
+    /// Values of all cells from the values of vertices; NaN where a cell has no data.
     pub fn spread(&self, values: &[f32]) -> Vec<f32> {
         let mut all = vec![f32::NAN; self.grid.width * self.grid.height];
         for (&cell, &value) in self.cells.iter().zip(values) {

@@ -22,7 +22,7 @@ pub struct TimeArgs {
     pub hours: Option<[f64; 2]>,
     /// Only months or a season, as 6-8 or winter
     ///
-    /// 11-2 runs over the end of the year. Seasons are those of the weather in the north: spring 3-5, summer 6-8, autumn 9-11,
+    /// 11-2 runs over the end of the year. Seasons are meteorological, of the northern hemisphere: spring 3-5, summer 6-8, autumn 9-11,
     /// winter 12-2.
     #[arg(long, value_name = "MONTHS", value_parser = months)]
     pub months: Option<[u32; 2]>,
