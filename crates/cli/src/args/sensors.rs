@@ -23,7 +23,7 @@ pub struct PlacementArgs {
     /// none. Several are separated by commas.
     #[arg(long, value_name = "KINDS", requires = "surfaces", value_delimiter = ',', value_parser = surface)]
     pub on: Vec<Surface>,
-    /// Distance from the surface, along its normal
+    /// Distance from the surface
     #[arg(
         long,
         value_name = "METRES",
@@ -46,7 +46,7 @@ pub struct PlacementArgs {
     /// Distance between sensors --along lines
     #[arg(long, value_name = "METRES", requires = "along", value_parser = values::positive)]
     pub spacing: Option<f64>,
-    /// Raise sensors of --grid, --vertices, --along
+    /// Raise grids, vertices and lines
     ///
     /// They keep their normals. 1.5 is the height of eyes above a street.
     #[arg(long, value_name = "METRES", default_value_t = 0.0, conflicts_with_all = ["surfaces", "sensors"], value_parser = values::from_zero)]

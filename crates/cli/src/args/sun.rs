@@ -18,7 +18,7 @@ use crate::json::Destination;
 pub struct SunArgs {
     #[arg(help = SCENE, long_help = SCENE_LONG)]
     pub scene: PathBuf,
-    /// What to write: .csv, .ply, .npz, .png, .svg, .pdf or .tif
+    /// Result: .csv, .ply, .npz, .png, .svg, .pdf or .tif
     ///
     /// May be given several times. A .csv has a line per sensor, a .ply the mesh or the sensors in colours, a .png, .svg
     /// or .pdf a map of a --grid, and an .npz all values with the visibility matrices. Beside a .png is a .pgw, the world file
@@ -55,24 +55,24 @@ pub struct SunArgs {
     /// Sensors lie on the surfaces that are uppermost, roofs and ground alike, and face as these do.
     #[arg(long, value_name = "METRES", group = "where", value_parser = values::positive, help_heading = heading::SENSORS)]
     pub grid: Option<f64>,
-    /// A sensor at every vertex of the mesh
+    /// A sensor at every vertex
     ///
     /// Vertices of a height raster are the centres of its cells.
     #[arg(long, visible_alias = "cells", group = "where", help_heading = heading::SENSORS)]
     pub vertices: bool,
     #[command(flatten)]
     pub placement: PlacementArgs,
-    /// Axis that points up [default: that of the scene]
+    /// Axis that points up [default: the scene's]
     ///
     /// North is y where z points up, and -z where y does.
     #[arg(long, value_name = "AXIS", value_parser = up_axis, help_heading = heading::SENSORS)]
     pub up: Option<UpAxis>,
-    /// Angle from mesh north to true north
+    /// Angle from mesh to true north
     ///
     /// Clockwise as seen from above: 90 where the x axis of a mesh with z up points north.
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, help_heading = heading::SENSORS)]
     pub north: f64,
-    /// Unit of the mesh: mm, cm, m, km, in or ft
+    /// Unit: mm, cm, m, km, in or ft
     #[arg(long, value_enum, default_value_t = Unit::M, hide_possible_values = true, help_heading = heading::SENSORS)]
     pub units: Unit,
     /// Latitude in degrees, south negative
@@ -81,7 +81,7 @@ pub struct SunArgs {
     /// Longitude in degrees, west negative
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, requires = "lat", help_heading = heading::SUN)]
     pub lon: Option<f64>,
-    /// Metres above the sea [default: the weather's, or 0]
+    /// Above the sea [default: the weather's, or 0]
     #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = heading::SUN)]
     pub altitude: Option<f64>,
     #[command(flatten)]
@@ -91,7 +91,7 @@ pub struct SunArgs {
     /// An .epw file of EnergyPlus. Gives the place and the steps of time, too.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["step", "year"], help_heading = heading::SUN)]
     pub epw: Option<PathBuf>,
-    /// First moment, as 2024-06-21 or 2024-06-21T08:00
+    /// First moment, as 2024-06-21[T08:00]
     ///
     /// If absent: all of --year, or of the weather.
     #[arg(long, value_name = "TIME", requires = "to", help_heading = heading::SUN)]
@@ -99,7 +99,7 @@ pub struct SunArgs {
     /// End of the time; a date counts to its end
     #[arg(long, value_name = "TIME", requires = "from", value_parser = end_of, help_heading = heading::SUN)]
     pub to: Option<Moment>,
-    /// Year, if --from and --to are absent
+    /// Year, without --from and --to
     #[arg(long, value_name = "YEAR", default_value_t = 2025, conflicts_with = "from", value_parser = clap::value_parser!(i32).range(1..=5999), help_heading = heading::SUN)]
     pub year: i32,
     /// Light that the ground reflects, with --epw
@@ -122,7 +122,7 @@ pub struct SunArgs {
     /// Each sun stands for the step around it: the sun is that of the middle of the step.
     #[arg(long, value_name = "MINUTES", default_value_t = 60.0, value_parser = values::positive, help_heading = heading::SUN)]
     pub step: f64,
-    /// Patches: 145, 577, 2305 or uniform:N
+    /// 145, 577, 2305 or uniform:N
     ///
     /// 145 are those of Tregenza, 577 and 2305 those of Reinhart. uniform:N are N patches of the same size.
     #[arg(long, value_name = "PATCHES", default_value = "145", value_parser = sky, help_heading = heading::SUN)]

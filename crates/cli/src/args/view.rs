@@ -31,7 +31,7 @@ pub struct ViewArgs {
     /// Hours ahead of UTC [default: by the longitude]
     #[arg(long, value_name = "HOURS", allow_negative_numbers = true, requires = "day", help_heading = heading::SUN)]
     pub timezone: Option<f64>,
-    /// Angle from mesh north to true north, clockwise
+    /// From mesh north to true north, clockwise
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, requires = "day", help_heading = heading::SUN)]
     pub north: f64,
     #[command(flatten)]

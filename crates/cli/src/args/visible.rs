@@ -25,7 +25,7 @@ pub struct VisibleArgs {
     /// Points looked at [default: those of A.csv]
     #[arg(value_name = "B.csv", conflicts_with = "surface")]
     pub to: Option<PathBuf>,
-    /// What to write: .npz, .csv, .ply, .png, .svg, .pdf or .tif
+    /// Result: .npz, .csv, .ply, .png, .svg, .pdf or .tif
     ///
     /// May be given several times. An .npz has the matrix as bits with the counts, a .csv the count of every point of A (of a
     /// viewshed: of every place), a .ply the points of A or the mesh in colours, and a .png, .svg or .pdf a map of
@@ -56,33 +56,33 @@ pub struct VisibleArgs {
     /// Height of observers above A
     #[arg(long, value_name = "UNITS", default_value_t = 0.0, value_parser = values::from_zero, help_heading = heading::WORK)]
     pub eye: f64,
-    /// Height of targets above B, or the surface
+    /// Targets above B, or the surface
     #[arg(long, value_name = "UNITS", default_value_t = 0.0, value_parser = values::from_zero, help_heading = heading::WORK)]
     pub target: f64,
-    /// Length left out at both ends [default: origin offset]
+    /// Left out at both ends [default: origin offset]
     ///
     /// The origin offset is about 4 millionths of the largest coordinate. A point on a surface is rounded, and without a
     /// margin its own surface hides it now and then. 0 takes the bare lines.
     #[arg(long, value_name = "UNITS", value_parser = values::from_zero, help_heading = heading::WORK)]
     pub margin: Option<f64>,
-    /// Axis that points up [default: that of the scene]
+    /// Axis that points up [default: the scene's]
     #[arg(long, value_name = "AXIS", value_parser = up_axis, help_heading = heading::WORK)]
     pub up: Option<UpAxis>,
-    /// Greatest distance in plan at which a place is seen
+    /// Greatest distance of sight, in plan
     #[arg(long, value_name = "UNITS", requires = "viewshed", value_parser = values::positive, help_heading = heading::WORK)]
     pub radius: Option<f64>,
-    /// Take the earth as round, and light as bent by air
+    /// Round earth, and light that air bends
     ///
     /// Places d away lie lower by (1 - k) d² / (2 R), with --refraction k and the --earth-radius R.
     #[arg(long, help_heading = heading::WORK)]
     pub curvature: bool,
-    /// Coefficient of refraction; 0 without air
+    /// Refraction; 0 without air
     #[arg(long, value_name = "K", default_value_t = antumbra_bake::REFRACTION, allow_negative_numbers = true, requires = "curvature", help_heading = heading::WORK)]
     pub refraction: f64,
     /// Radius of the earth
     #[arg(long, value_name = "METRES", default_value_t = antumbra_bake::EARTH_RADIUS, requires = "curvature", value_parser = values::positive, help_heading = heading::WORK)]
     pub earth_radius: f64,
-    /// Unit of the scene, for --curvature: m, ft, ...
+    /// Unit, for --curvature: m, ft, ...
     #[arg(long, value_enum, default_value_t = Unit::M, hide_possible_values = true, requires = "curvature", help_heading = heading::WORK)]
     pub units: Unit,
     #[command(flatten)]
