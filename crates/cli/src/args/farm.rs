@@ -53,7 +53,7 @@ pub struct FarmArgs {
     /// May be given several times for jobs of sun and visible.
     #[arg(short, long, value_name = "FILE", required = true, help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
-    /// Command: render, ao, sun or visible
+    /// render, ao, sun or visible
     #[arg(long = "command", value_name = "COMMAND", value_enum, default_value_t = FarmJob::Render, hide_possible_values = true, help_heading = heading::JOB)]
     pub job: FarmJob,
     /// Standard error of every pixel's mean, as .exr
