@@ -1,4 +1,4 @@
-//! Heat maps: scalar fields drawn in the colours of the [palette](crate::palette), with a legend.
+//! Heat maps: scalar fields drawn in the colours of the [palette], with a legend.
 
 use crate::{Error, Rgb8Image, digits, palette};
 
