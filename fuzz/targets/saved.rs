@@ -35,9 +35,13 @@ fn sealed(magic: &[u8; 8], contents: &[u8]) -> Vec<u8> {
         padded.resize((frame.len() / 64 + 1) * 64, 0);
         for (place, long) in padded.as_chunks().0.iter().enumerate() {
             let lane = &mut lanes[place % 8];
-            *lane = (*lane ^ u64::from_le_bytes(*long)).wrapping_mul(STEP).rotate_left(29);
+            *lane = (*lane ^ u64::from_le_bytes(*long))
+                .wrapping_mul(STEP)
+                .rotate_left(29);
         }
-        sum = lanes.iter().fold(0, |sum, lane| mixed((sum ^ lane).wrapping_add(STEP)));
+        sum = lanes
+            .iter()
+            .fold(0, |sum, lane| mixed((sum ^ lane).wrapping_add(STEP)));
         file.extend(first.to_le_bytes());
         file.extend(frame);
         file.extend(sum.to_le_bytes());
@@ -70,7 +74,9 @@ fn read<T: Saved>(magic: &[u8; 8], contents: &[u8]) -> Option<(T, Functions)> {
     for functions in [
         Functions::new(),
         Functions::new().filters(vec![Arc::new(Half)]),
-        Functions::new().filters(vec![Arc::new(Half)]).shapes(vec![Arc::new(Half)]),
+        Functions::new()
+            .filters(vec![Arc::new(Half)])
+            .shapes(vec![Arc::new(Half)]),
     ] {
         if let Ok(read) = functions.from_bytes(&file) {
             return Some((read, functions));
@@ -164,7 +170,11 @@ fuzz_target!(|bytes: &[u8]| {
         _ => {
             if let Some((object, functions)) = read::<Object>(b"ANTUOBJT", contents) {
                 ask_saved(object.bvh().clone(), &functions);
-                let here = [[1.0, 0.5, 0.0, 0.2], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, -2.0, 0.0]];
+                let here = [
+                    [1.0, 0.5, 0.0, 0.2],
+                    [0.0, 1.0, 0.0, 0.0],
+                    [0.0, 0.0, -2.0, 0.0],
+                ];
                 let here = [Instance::new(0, here)];
                 if let Ok(world) = World::on_ground(&object, &[&object], &here) {
                     ask(world.bvh().clone());

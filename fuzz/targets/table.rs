@@ -13,6 +13,8 @@ fuzz_target!(|text: &str| {
             assert!([0, sensors.points.len()].contains(&sensors.normals.len()));
             assert!(sensors.points.as_flattened().iter().all(|x| !x.is_nan()));
         }
-        Err(bad) => assert!((1..=text.lines().count().max(1)).contains(&bad.line) && !bad.reason.is_empty()),
+        Err(bad) => {
+            assert!((1..=text.lines().count().max(1)).contains(&bad.line) && !bad.reason.is_empty())
+        }
     }
 });

@@ -16,6 +16,8 @@ fuzz_target!(|text: &str| {
             let steps = weather.steps(weather.zone, None);
             assert_eq!(steps.len(), weather.records.len());
         }
-        Err(bad) => assert!((1..=text.lines().count().max(1)).contains(&bad.line) && !bad.reason.is_empty()),
+        Err(bad) => {
+            assert!((1..=text.lines().count().max(1)).contains(&bad.line) && !bad.reason.is_empty())
+        }
     }
 });

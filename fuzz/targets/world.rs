@@ -16,7 +16,9 @@ fn shorten(scene: &mut Scene) {
         *radius = radius.map(|r| r.min(3.0));
     }
     match &mut scene.integrator {
-        Integrator::Path { max_depth, .. } => *max_depth = (*max_depth).min(4),
+        Integrator::Path { max_depth, .. } | Integrator::VolumePath { max_depth, .. } => {
+            *max_depth = (*max_depth).min(4);
+        }
         Integrator::DirectLighting { max_depth, .. } => *max_depth = (*max_depth).min(3),
         Integrator::AmbientOcclusion { samples, .. } => *samples = (*samples).min(4),
     }
