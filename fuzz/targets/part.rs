@@ -38,6 +38,7 @@ fuzz_target!(|bytes: &[u8]| {
         rows: &rows,
         columns: None,
         margin: None,
+        range: None,
     };
     let key = Key::of(&job, |_| ());
     let mut work = Work::new(&job, key, [0, 1], Vec::new());
