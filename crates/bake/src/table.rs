@@ -130,7 +130,7 @@ fn has_decimal_comma(field: &str) -> bool {
 
 /// Places of the columns of a table.
 struct Columns {
-    /// Those of [`COLUMNS`], as far as they are there.
+    /// Places of the [`COLUMNS`] that the table has.
     places: [Option<usize>; 6],
     /// Names of points.
     name: Option<usize>,

@@ -1,6 +1,6 @@
 //! Constants and structures of Embree 4's binary interface, from its documentation.
 //!
-//! Structures are those of release libraries since 4.3: one level of instances, and `instPrimID` in hits.
+//! Structures have the layout of release libraries since 4.3: one level of instances, and `instPrimID` in hits.
 
 use std::ffi::{c_char, c_int, c_uint, c_void};
 

@@ -86,7 +86,7 @@ impl Device {
         }
     }
 
-    /// Tells the memory monitor of bytes that come, or go if negative. The monitor may refuse those that come.
+    /// Reports bytes that come, or go if negative, to the memory monitor. The monitor may refuse bytes that come.
     pub fn count_memory(&self, bytes: isize) -> Outcome {
         let callback = *lock(&self.memory);
         let Some(Callback { function, user }) = callback else {

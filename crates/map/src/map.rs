@@ -111,7 +111,7 @@ impl Map<'_> {
         Ok(parts.sheet.drawing(size, self.title))
     }
 
-    /// Lines of a world file, which tells GIS programs where the pixels of a PNG of this size are.
+    /// Lines of a world file, by which GIS programs place the pixels of a PNG of this size.
     ///
     /// `corner` is the north-western corner of the grid, and `east` and `north` are vectors of length 1, all in the plane of
     /// the coordinates of the model.

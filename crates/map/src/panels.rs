@@ -16,7 +16,7 @@ pub struct Panel<'a> {
     pub title: &'a str,
     /// Small line below the title, or empty.
     pub subtitle: &'a str,
-    /// What its colours mean, if they are those of the palette.
+    /// What its colours mean, if they come from the palette.
     pub legend: Option<PanelLegend<'a>>,
 }
 

@@ -351,7 +351,7 @@ struct Surface<'a> {
 }
 
 impl<'a> Surface<'a> {
-    /// A surface over a width, in the unit of the model. Normals are those of central differences.
+    /// A surface over a width, in the unit of the model. Normals come from central differences.
     fn new(heights: &'a [f32], rows: usize, columns: usize, width: f64) -> PyResult<Self> {
         let pixel = width / columns.max(1) as f64;
         let at = |row: usize, column: usize| heights[row * columns + column];

@@ -220,8 +220,8 @@ pub enum Command {
     Sun(SunArgs),
     /// Tell which points see each other, and what observers see
     ///
-    /// Points see each other if nothing lies between them. With --viewshed, every place of the mesh is told how many of the
-    /// points of A.csv see it.
+    /// Points see each other if nothing lies between them. With --viewshed, the result is how many points of
+    /// A.csv see each place of the mesh.
     Visible(VisibleArgs),
     /// Describe a scene and its trees
     Info(InfoArgs),

@@ -46,7 +46,7 @@ pub struct SunArgs {
     /// Sensors from a table: x, y [, z] [, nx, ny, nz]
     ///
     /// Columns are known by the names in the first line, or else by their order. Sensors without normals see all around.
-    /// Coordinates are those of the mesh. Sensors without heights are on the surface that is seen from above. Names, in a column
+    /// Coordinates are in the system of the mesh. Sensors without heights are on the surface that is seen from above. Names, in a column
     /// name or id, come back in a .csv.
     #[arg(long, value_name = "FILE", group = "where", help_heading = heading::SENSORS)]
     pub sensors: Option<PathBuf>,

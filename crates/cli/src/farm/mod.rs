@@ -144,7 +144,7 @@ impl Plan {
         first.chain(&self.more_outputs).cloned().collect()
     }
 
-    /// Whether tasks are those of a bake, which keep unfinished work in the part itself, and not of a picture.
+    /// Whether tasks bake, and keep unfinished work in the part itself, instead of rendering a picture.
     fn is_bake(&self) -> bool {
         self.command != FarmJob::Render.name()
     }
@@ -206,7 +206,7 @@ fn check_bake(args: &FarmArgs) -> Result<(), Failure> {
         Some(Command::Visible(bake)) => (bake.output.len(), bake.json),
         _ => {
             return Err(Failure::Usage(
-                "flags after -- are those of the command".into(),
+                "flags after -- belong to the command".into(),
             ));
         }
     };

@@ -32,7 +32,7 @@ const MOST: f64 = 256.0;
 
 impl Curves<'_> {
     /// Segments in place of cubic curves with four control points each, `[n, 4]`: x, y, z, radius. Cubic curve `i` has the
-    /// points from `first[i]` on; curves that share points, as those of a B-spline do, are one chain.
+    /// points from `first[i]` on; curves that share points, as in a B-spline, are one chain.
     ///
     /// No point of a curve, and no radius, is farther from its segments than `tolerance` times the largest radius of its control
     /// points, unless that takes more than 256 segments. pbrt stops at 0.1. By the second derivative: a cubic whose

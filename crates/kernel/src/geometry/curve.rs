@@ -229,7 +229,7 @@ impl ScalarShape for CurveSegment {
         Some(place.near(position, [share, 0.5]))
     }
 
-    /// That of the cone.
+    /// Area of the cone.
     fn area(&self) -> f64 {
         let axis = self.axis();
         2.0 * PI * self.radius(0.5) * math::sqrt(dot(axis, axis))
@@ -259,7 +259,7 @@ impl ScalarShape for CurveSegment {
 
 /// What a distance across a ray may be off in single precision, relative to `R`: `256 u`, see [`CurveSegment::candidates`].
 const ACROSS: f32 = 1.0 / (1 << 16) as f32;
-/// The same for the place of the nearest point, times the length that is seen: `512 u`.
+/// What the place of the nearest point may be off, times the length that is seen, relative to `R`: `512 u`.
 const PLACE: f32 = 1.0 / (1 << 15) as f32;
 /// Segments of which less than this share is seen are left to the test.
 const SEEN2: f32 = 1.0 / (1 << 20) as f32;

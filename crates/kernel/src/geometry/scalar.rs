@@ -77,7 +77,7 @@ pub(crate) trait ScalarPrim:
     /// Numbers of a primitive in a file; 0 if no file can hold one.
     const NUMBERS: usize;
 
-    /// Which of the first `count` primitives a ray may hit, as bits. A kind may tell cheaply which it does not.
+    /// Which of the first `count` primitives a ray may hit, as bits. A kind may rule some out cheaply.
     #[inline(always)]
     fn candidates(_: &[Self; BLOCK], count: usize, _: &RaySetup) -> u32 {
         (1 << count) - 1
