@@ -232,7 +232,7 @@ fn check_flags(args: &FarmArgs) -> Result<(), Failure> {
     let line = line.into_iter().chain(args.flags.iter().cloned());
     let cli = Cli::try_parse_from(line).map_err(|error| Failure::Usage(error.to_string()))?;
     let Some(Command::Render(render)) = cli.command else {
-        return Err(Failure::Usage("flags after -- are those of render".into()));
+        return Err(Failure::Usage("flags after -- belong to render".into()));
     };
     let ours = [
         ("--output", render.output.is_some()),

@@ -61,17 +61,21 @@ impl Conditions<'_> {
     /// Whether hits of the ray at this place on a primitive can count.
     #[inline(always)]
     pub fn may_count(&self, place: usize, id: PrimId) -> bool {
-        if self.except.is_some_and(|except| except[place] == id) {
-            return false;
-        }
-        let mask = match self.mask {
-            None => return true,
-            Some(RayMasks::Same(mask)) => mask,
-            Some(RayMasks::Each(masks)) => masks[place],
-        };
-        match self.masks {
-            None => mask != 0,
-            Some(masks) => masks.shows(mask, id.inst_id, id.geom_id),
+        self.by_name(place).may_count(id)
+    }
+
+    /// Condition of the ray at this place, without the filter.
+    #[inline(always)]
+    fn by_name(&self, place: usize) -> Condition<'_> {
+        Condition {
+            excluded: self.except.map_or(PrimId::NONE, |except| except[place]),
+            mask: self.mask.map(|mask| match mask {
+                RayMasks::Same(mask) => mask,
+                RayMasks::Each(masks) => masks[place],
+            }),
+            masks: self.masks,
+            accept: None,
+            after: None,
         }
     }
 
@@ -81,17 +85,11 @@ impl Conditions<'_> {
             .filter
             .map(|filter| move |hit: &Hit| filter(place, hit));
         work(&Condition {
-            excluded: self.except.map_or(PrimId::NONE, |except| except[place]),
-            mask: self.mask.map(|mask| match mask {
-                RayMasks::Same(mask) => mask,
-                RayMasks::Each(masks) => masks[place],
-            }),
-            masks: self.masks,
             accept: match &filter {
                 Some(filter) => Some(filter),
                 None => None,
             },
-            after: None,
+            ..self.by_name(place)
         })
     }
 }
@@ -140,6 +138,7 @@ impl<'a> Condition<'a> {
     }
 
     /// Whether hits on a primitive can count.
+    #[inline(always)]
     pub fn may_count(&self, id: PrimId) -> bool {
         id != self.excluded
             && match (self.mask, self.masks) {
