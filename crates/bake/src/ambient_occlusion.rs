@@ -6,7 +6,7 @@ use antumbra::{Aabb, Bvh, Ray};
 use rayon::prelude::*;
 
 use crate::curve::OrderedPoints;
-use crate::directions::{Directions, key};
+use crate::directions::{Samples, key};
 use crate::memory;
 use crate::normals::unit;
 use crate::visibility::above;
@@ -73,7 +73,14 @@ pub fn ambient_occlusion(
     monitor: &dyn Monitor,
 ) -> Result<Vec<f32>, Error> {
     let part = |side: &Side, _| side.part(options.samples);
-    bake((bvh, points, normals), options, monitor, f32::NAN, part)
+    let wanted = Wanted::Parts;
+    bake(
+        (bvh, points, normals),
+        (options, wanted),
+        monitor,
+        f32::NAN,
+        part,
+    )
 }
 
 /// The open part of the sky above a point, and where it lies.
@@ -105,7 +112,7 @@ pub fn bent_normals(
     };
     bake(
         (bvh, points, normals),
-        options,
+        (options, Wanted::Directions),
         monitor,
         none,
         |side, normal| BentNormal {
@@ -133,16 +140,17 @@ pub fn ambient_rays(
         return rays;
     }
     let bounds = bvh.bounds();
+    let samples = Samples::new(per_point as u32, options.weighting);
     for index in 0..some {
         // The product may be beyond a word.
         let place = (index as u128 * points.len() as u128 / some as u128) as usize;
         let (point, normal) = (&points[place], &normals[place]);
         if let Some(unit) = unit_normal(point, normal) {
             let org = above(&bounds, point, unit);
-            let directions = Directions::new(unit, key(options.seed, point, normal));
+            let directions = samples.around(unit, key(options.seed, point, normal));
             rays.extend((0..per_point as u32).map(|sample| Ray {
                 tfar: options.distance,
-                ..Ray::new(org, directions.get(sample, options.weighting))
+                ..Ray::new(org, directions.get(sample))
             }));
         }
     }
@@ -150,12 +158,11 @@ pub fn ambient_rays(
     rays
 }
 
-/// What was found on one side of a point.
+/// Rays of one side of a point that nothing stopped.
 #[derive(Clone, Copy, Default)]
 struct Side {
-    /// Rays that nothing stopped.
     open: u32,
-    /// Sum of their directions.
+    /// Sum of their directions, where directions are wanted.
     sum: [f64; 3],
 }
 
@@ -166,10 +173,17 @@ impl Side {
     }
 }
 
+/// What a side has to know of its open rays.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Wanted {
+    Parts,
+    Directions,
+}
+
 /// One value per point: `none`, or what `finish` makes of the more open side and its normal.
 fn bake<T: Copy + Send + Sync>(
     (bvh, points, normals): (&Bvh, &[[f32; 3]], &[[f32; 3]]),
-    options: &AmbientOcclusion,
+    (options, wanted): (&AmbientOcclusion, Wanted),
     monitor: &dyn Monitor,
     none: T,
     finish: impl Fn(&Side, [f64; 3]) -> T + Sync,
@@ -180,6 +194,7 @@ fn bake<T: Copy + Send + Sync>(
     let block = (RAYS / per_point).clamp(1, MOST_POINTS);
     let bounds = bvh.bounds();
     let mut values = memory::filled("values", points.len(), none)?;
+    let samples = Samples::new(options.samples, options.weighting);
     let places = OrderedPoints::new(points, normals)?;
     let OrderedPoints {
         points, normals, ..
@@ -187,7 +202,7 @@ fn bake<T: Copy + Send + Sync>(
     let done = AtomicUsize::new(0);
     let blocks = values.par_chunks_mut(block).enumerate();
     blocks.try_for_each_init(
-        || Worker::new(bvh, bounds, options, monitor),
+        || Worker::new((bvh, bounds), (options, &samples, wanted), monitor),
         |worker, (index, values)| {
             let first = index * block;
             let range = first..first + values.len();
@@ -228,30 +243,33 @@ struct Worker<'a> {
     bvh: &'a Bvh,
     bounds: Aabb,
     options: &'a AmbientOcclusion,
+    samples: &'a Samples,
+    wanted: Wanted,
     monitor: &'a dyn Monitor,
     rays: Vec<Ray>,
-    /// Side of each ray: its place in `found`.
-    sides: Vec<u32>,
-    bits: Vec<u64>,
+    /// Places in `found` of the sides whose rays wait, each with the number of rays up to its last.
+    sides: Vec<(usize, usize)>,
+    occluded: Vec<bool>,
     /// Two sides of each point.
     found: Vec<Side>,
 }
 
 impl<'a> Worker<'a> {
     fn new(
-        bvh: &'a Bvh,
-        bounds: Aabb,
-        options: &'a AmbientOcclusion,
+        (bvh, bounds): (&'a Bvh, Aabb),
+        (options, samples, wanted): (&'a AmbientOcclusion, &'a Samples, Wanted),
         monitor: &'a dyn Monitor,
     ) -> Self {
         Self {
             bvh,
             bounds,
             options,
+            samples,
+            wanted,
             monitor,
             rays: Vec::new(),
             sides: Vec::new(),
-            bits: Vec::new(),
+            occluded: Vec::new(),
             found: Vec::new(),
         }
     }
@@ -277,7 +295,7 @@ impl<'a> Worker<'a> {
             };
             let key = key(self.options.seed, point, normal);
             for (side, sign) in sides.iter().enumerate() {
-                let place = (2 * index + side) as u32;
+                let place = 2 * index + side;
                 self.look(place, point, unit.map(|x| sign * x), key)?;
             }
         }
@@ -299,18 +317,23 @@ impl<'a> Worker<'a> {
     /// Sends the rays of one side of a point.
     fn look(
         &mut self,
-        place: u32,
+        place: usize,
         point: &[f32; 3],
         normal: [f64; 3],
         key: u64,
     ) -> Result<(), Error> {
         let org = above(&self.bounds, point, normal);
-        let directions = Directions::new(normal, key);
-        for sample in 0..self.options.samples {
-            let mut ray = Ray::new(org, directions.get(sample, self.options.weighting));
-            ray.tfar = self.options.distance;
-            self.rays.push(ray);
-            self.sides.push(place);
+        let directions = self.samples.around(normal, key);
+        let tfar = self.options.distance;
+        let mut sent = 0;
+        while sent < self.options.samples {
+            let room = (RAYS - self.rays.len()).min((self.options.samples - sent) as usize) as u32;
+            self.rays.extend((sent..sent + room).map(|sample| Ray {
+                tfar,
+                ..Ray::new(org, directions.get(sample))
+            }));
+            self.sides.push((place, self.rays.len()));
+            sent += room;
             if self.rays.len() == RAYS {
                 self.flush()?;
             }
@@ -323,17 +346,25 @@ impl<'a> Worker<'a> {
         if self.monitor.cancelled() {
             return Err(Error::Cancelled);
         }
-        self.bits.clear();
-        self.bits.resize(self.rays.len().div_ceil(64), 0);
+        self.occluded.clear();
+        self.occluded.resize(self.rays.len(), false);
         let batch = self.bvh.batch(&self.rays[..]).on_this_thread();
-        batch.occluded_bits_into(&mut self.bits);
-        for (ray, &side) in self.sides.iter().enumerate() {
-            if self.bits[ray / 64] >> (ray % 64) & 1 == 0 {
-                let found = &mut self.found[side as usize];
-                let dir = self.rays[ray].dir;
-                found.open += 1;
-                found.sum = [0, 1, 2].map(|axis| found.sum[axis] + f64::from(dir[axis]));
+        batch.occluded_into(&mut self.occluded);
+        let mut first = 0;
+        for &(place, end) in &self.sides {
+            let found = &mut self.found[place];
+            let occluded = &self.occluded[first..end];
+            found.open += occluded
+                .iter()
+                .map(|&occluded| u32::from(!occluded))
+                .sum::<u32>();
+            if self.wanted == Wanted::Directions {
+                let rays = self.rays[first..end].iter().zip(occluded);
+                for (Ray { dir, .. }, _) in rays.filter(|(_, occluded)| !**occluded) {
+                    found.sum = [0, 1, 2].map(|axis| found.sum[axis] + f64::from(dir[axis]));
+                }
             }
+            first = end;
         }
         self.rays.clear();
         self.sides.clear();
@@ -368,9 +399,10 @@ mod tests {
         let offset = f64::from(bounds.union(&Aabb::around(&[*point])).origin_offset());
         let is_open = |sign: f64, sample: u32| {
             let up = unit.map(|x| sign * x);
-            let directions = Directions::new(up, key(options.seed, point, normal));
+            let samples = Samples::new(options.samples / 2, options.weighting);
+            let directions = samples.around(up, key(options.seed, point, normal));
             let org = [0, 1, 2].map(|axis| (f64::from(point[axis]) + offset * up[axis]) as f32);
-            let dir = directions.get(sample, options.weighting);
+            let dir = directions.get(sample);
             let ray = Ray {
                 tfar: options.distance,
                 ..Ray::new(org, dir)

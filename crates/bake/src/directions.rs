@@ -1,9 +1,13 @@
 //! Directions over a hemisphere, spread evenly and different at every point.
 //!
-//! Sample `i` is point `i` of the (0, 2)-sequence of Sobol', scrambled by exclusive or with two numbers of the point in
-//! question (Kollig and Keller 2002, "Efficient multidimensional sampling"). Of each power of two of samples, every
-//! interval of that many equal parts of either coordinate holds one. The numbers are a hash of the point, its normal and
-//! the seed. So a point has the same directions in whatever list it stands, and vertices that are stored twice agree.
+//! Sample `i` is point `i` of the (0, 2)-sequence of Sobol'. The first coordinate is the height, scrambled by exclusive or with
+//! a number of the point in question (Kollig and Keller 2002, "Efficient multidimensional sampling"). The second is the angle
+//! around the normal, which starts at another number of the point (Cranley and Patterson 1976). So sines and cosines are those
+//! of one table, and each power of two of samples has one in every interval of that many equal parts of either coordinate.
+//! The numbers are a hash of the point, its normal and the seed. So a point has the same directions in whatever list it
+//! stands, and vertices that are stored twice agree.
+
+use std::f64::consts::TAU;
 
 use crate::normals::cross;
 
@@ -17,16 +21,56 @@ pub enum Weighting {
     Uniform,
 }
 
-/// Directions around one normal.
-pub(crate) struct Directions {
-    /// Two tangents and the normal.
-    frame: [[f64; 3]; 3],
-    scramble: [u32; 2],
+/// Samples of the table; those behind it are computed each time.
+const MOST: u32 = 1 << 12;
+
+/// Samples of a hemisphere, for all points.
+pub(crate) struct Samples {
+    weighting: Weighting,
+    table: Vec<Sample>,
 }
 
-impl Directions {
+/// A sample before the numbers of a point change it.
+#[derive(Clone, Copy)]
+struct Sample {
+    /// First coordinate, as a fraction of 2³².
+    height: u32,
+    /// Cosine and sine of the angle around the normal.
+    turn: [f64; 2],
+}
+
+impl Sample {
+    fn new(index: u32) -> Self {
+        Self {
+            height: index.reverse_bits(),
+            turn: turn(second_dimension(index)),
+        }
+    }
+}
+
+/// Cosine and sine of a part of a turn, given as a fraction of 2³².
+fn turn(part: u32) -> [f64; 2] {
+    // The system's own functions differ in their last bits.
+    let (sin, cos) = libm::sincos(TAU * fraction(part));
+    [cos, sin]
+}
+
+/// A number within [0, 1): 32 bits fit a double.
+fn fraction(bits: u32) -> f64 {
+    f64::from(bits) / 4_294_967_296.0
+}
+
+impl Samples {
+    /// For up to `count` samples a point; there are more, but they take longer.
+    pub fn new(count: u32, weighting: Weighting) -> Self {
+        Self {
+            weighting,
+            table: (0..count.min(MOST)).map(Sample::new).collect(),
+        }
+    }
+
     /// Directions around a normal of length 1; `key` decides which of all sequences.
-    pub fn new(normal: [f64; 3], key: u64) -> Self {
+    pub fn around(&self, normal: [f64; 3], key: u64) -> Directions<'_> {
         // Crossed with the axis that is farthest from the normal, so that the length is not near 0.
         let axis = (0..3).fold(0, |least, axis| {
             if normal[axis].abs() < normal[least].abs() {
@@ -40,31 +84,46 @@ impl Directions {
         let tangent = cross(normal, other);
         let length = tangent.iter().map(|x| x * x).sum::<f64>().sqrt();
         let tangent = tangent.map(|x| x / length);
-        Self {
-            frame: [tangent, cross(normal, tangent), normal],
-            scramble: [key as u32, (key >> 32) as u32],
+        let side = cross(normal, tangent);
+        let [cos, sin] = turn((key >> 32) as u32);
+        let turned = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|axis| cos * a[axis] + sin * b[axis]);
+        Directions {
+            samples: self,
+            frame: [
+                turned(tangent, side),
+                turned(side, tangent.map(|x| -x)),
+                normal,
+            ],
+            scramble: key as u32,
         }
     }
+}
 
+/// Directions around one normal.
+pub(crate) struct Directions<'a> {
+    samples: &'a Samples,
+    /// Two tangents and the normal.
+    frame: [[f64; 3]; 3],
+    scramble: u32,
+}
+
+impl Directions<'_> {
     /// Direction of sample `index`, of length 1 up to rounding, above the plane of the normal.
-    pub fn get(&self, index: u32, weighting: Weighting) -> [f32; 3] {
-        // Within [0, 1), because 32 bits fit a double.
-        let [u, v] = [
-            index.reverse_bits() ^ self.scramble[0],
-            second_dimension(index) ^ self.scramble[1],
-        ]
-        .map(|bits| f64::from(bits) / 4_294_967_296.0);
-        let z = match weighting {
-            Weighting::Cosine => (1.0 - u).sqrt(),
-            Weighting::Uniform => 1.0 - u,
+    #[inline]
+    pub fn get(&self, index: u32) -> [f32; 3] {
+        let sample = match self.samples.table.get(index as usize) {
+            Some(sample) => *sample,
+            None => Sample::new(index),
         };
-        let r = (1.0 - z * z).max(0.0).sqrt();
-        // The system's own functions differ in their last bits.
-        let (sin, cos) = libm::sincos(std::f64::consts::TAU * v);
-        let local = [r * cos, r * sin, z];
+        let u = fraction(sample.height ^ self.scramble);
+        let (r, z) = match self.samples.weighting {
+            Weighting::Cosine => (u.sqrt(), (1.0 - u).sqrt()),
+            Weighting::Uniform => ((u * (2.0 - u)).sqrt(), 1.0 - u),
+        };
+        let [x, y] = sample.turn.map(|part| r * part);
         std::array::from_fn(|axis| {
             let [s, t, n] = self.frame.map(|vector| vector[axis]);
-            (local[0] * s + local[1] * t + local[2] * n) as f32
+            (x * s + y * t + z * n) as f32
         })
     }
 }
@@ -105,16 +164,53 @@ mod tests {
     use super::*;
     use crate::normals::unit;
 
+    /// Heights and angles of the directions themselves. Heights are scrambled to lie away from the ends of intervals.
+    #[test]
+    fn every_interval_of_heights_and_of_angles_holds_one_sample() {
+        for (key, weighting) in [
+            (0x5555_5555, Weighting::Uniform),
+            (0x1234_5678_9abc_def0, Weighting::Cosine),
+            (0xffff_ffff_0f3c_3c3c, Weighting::Uniform),
+        ] {
+            for log in 0..10 {
+                let count = 1_u32 << log;
+                let samples = Samples::new(count / 2, weighting);
+                let directions = samples.around([0.0, 0.0, 1.0], key);
+                // Angles begin anywhere: the first sample tells where, in the middle of its interval.
+                let [x, y, _] = directions.get(0).map(f64::from);
+                let start = y.atan2(x) / TAU - 0.5 / f64::from(count);
+                for first in [0, log] {
+                    let mut seen = vec![0; count as usize];
+                    for index in 0..count {
+                        let [x, y, z] = directions.get(index).map(f64::from);
+                        let height = match weighting {
+                            Weighting::Cosine => 1.0 - z * z,
+                            Weighting::Uniform => 1.0 - z,
+                        };
+                        let angle = (y.atan2(x) / TAU - start).rem_euclid(1.0);
+                        let part = if first == 0 { angle } else { height };
+                        seen[(part * f64::from(count)) as usize % count as usize] += 1;
+                    }
+                    assert!(
+                        seen.iter().all(|&count| count == 1),
+                        "{log} {first} {seen:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    /// Elementary intervals of both coordinates, before the numbers of a point.
     #[test]
     fn every_elementary_interval_holds_one_sample() {
-        for scramble in [0, 0x1234_5678_9abc_def0, u64::MAX] {
+        for scramble in [0, 0x9abc_def0, u32::MAX] {
             for log in 0..10 {
                 let count = 1_u32 << log;
                 for first in 0..=log {
                     let mut seen = vec![0; count as usize];
                     for index in 0..count {
-                        let u = index.reverse_bits() ^ scramble as u32;
-                        let v = second_dimension(index) ^ (scramble >> 32) as u32;
+                        let u = index.reverse_bits() ^ scramble;
+                        let v = second_dimension(index);
                         let [u, v] = [u, v].map(u64::from);
                         let cell =
                             ((u << first) >> 32) << (log - first) | (v << (log - first)) >> 32;
@@ -136,10 +232,11 @@ mod tests {
             ]
         }) {
             let normal = unit(*normal).expect("a normal");
-            let directions = Directions::new(normal, 77);
+            let samples = Samples::new(512, weighting);
+            let directions = samples.around(normal, 77);
             let mut sum = 0.0;
             for index in 0..1024 {
-                let dir = directions.get(index, weighting).map(f64::from);
+                let dir = directions.get(index).map(f64::from);
                 let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
                 assert!((dot(dir, dir) - 1.0).abs() < 1e-6);
                 assert!(dot(dir, normal) > -1e-6);

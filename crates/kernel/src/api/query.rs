@@ -226,24 +226,34 @@ impl Bvh {
         pending: &[u32],
         answers: &mut [Q::Answer],
     ) {
+        if batch.decides() || batch.reports_surfaces() {
+            self.stream_of::<Q, true>(memory, batch, pending, answers);
+        } else {
+            self.stream_of::<Q, false>(memory, batch, pending, answers);
+        }
+    }
+
+    /// A stream that decides about every hit and notes leaves (`CAREFUL`), or does neither.
+    pub(super) fn stream_of<Q: StreamQuery<Item: Stored>, const CAREFUL: bool>(
+        &self,
+        memory: &mut Memory,
+        batch: &RayBatch<'_>,
+        pending: &[u32],
+        answers: &mut [Q::Answer],
+    ) {
         let mut setups = core::mem::take(&mut memory.setups);
         setups.resize(stream::SETUPS, RaySetup::IDLE);
         let items = Stored::at_least(memory, stream::items(self.width().lanes(), self.depth()));
-        let setups_of = &mut setups[..];
-        let prefetch = self.prefetch;
-        let is_careful = batch.decides() || batch.reports_surfaces();
         on_tree!(&self.tree, bvh => {
-            if is_careful {
-                let stream = Stream::<Q, _, true> {
-                    bvh, items, setups: setups_of, batch, pending, answers, prefetch
-                };
-                self.isa().dispatch_vectors(stream);
-            } else {
-                let stream = Stream::<Q, _, false> {
-                    bvh, items, setups: setups_of, batch, pending, answers, prefetch
-                };
-                self.isa().dispatch_vectors(stream);
-            }
+            self.isa().dispatch_vectors(Stream::<Q, _, CAREFUL> {
+                bvh,
+                items,
+                setups: &mut setups,
+                batch,
+                pending,
+                answers,
+                prefetch: self.prefetch,
+            });
         });
         memory.setups = setups;
     }

@@ -3,6 +3,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 use core::cell::Cell;
+use core::sync::atomic::{AtomicUsize, Ordering};
 
 use super::batch::Batch;
 use crate::parallel::for_each;
@@ -10,6 +11,7 @@ use crate::ray::{Hit, Ray};
 use crate::trace::memory::Memory;
 use crate::trace::ray_batch::{LocatedHit, RayBatch, Report};
 use crate::trace::ray_sort::Key;
+use crate::trace::several::{Nearest, NearestHits};
 use crate::trace::visit::Visit;
 
 /// Rays that one thread takes at a time.
@@ -19,8 +21,8 @@ impl Batch<'_> {
     /// Calls `visit` with the hits of each ray, front to back, and with the state of the ray: `states[i]` belongs to ray `i`.
     /// Hits come as in [`RayQuery::visit_hits`](crate::RayQuery::visit_hits), until the closure accepts one or stops.
     ///
-    /// All rays are asked for their closest hits; those whose hit is rejected are asked for the next ones, together. Pays where
-    /// rays have few hits before they end, as shadow rays through glass. Rays are traced in the order given.
+    /// Rays go together: first to their closest hits, then those whose hit is rejected to their next eight. Where rays have
+    /// many hits, they begin with eight. Rays are traced in the order given.
     ///
     /// ```
     /// # use antumbra::{Bvh, Geometry, Ray, Recipe, Visit};
@@ -45,8 +47,10 @@ impl Batch<'_> {
         visit: impl Fn(&mut T, Hit) -> Visit + Sync,
     ) {
         assert_eq!(self.rays.len(), states.len(), "one state per ray");
+        let hits = HitsSoFar::default();
         let piece = |(index, states): (usize, &mut [T])| {
-            (self.bvh.pool).with(|memory| self.visit_piece(memory, index * CHUNK, states, &visit));
+            (self.bvh.pool)
+                .with(|memory| self.visit_piece(memory, index * CHUNK, states, &visit, &hits));
         };
         if self.among_threads && states.len() > CHUNK {
             for_each(states.chunks_mut(CHUNK).enumerate().collect(), piece);
@@ -61,36 +65,118 @@ impl Batch<'_> {
         first: usize,
         states: &mut [T],
         visit: &impl Fn(&mut T, Hit) -> Visit,
+        so_far: &HitsSoFar,
     ) {
         let len = states.len();
-        let mut rays: Vec<Ray> = (first..first + len).map(|place| self.ray(place)).collect();
-        let mut keys: Vec<Key> = (0..len).map(Key::at).collect();
-        let mut after = Vec::<Hit>::new();
-        let (mut found, mut hits) = (vec![None; len], vec![None; len]);
-        while !rays.is_empty() {
-            let open = rays.len();
-            found[..open].fill(None);
-            let cells = Cell::from_mut(&mut found[..open]).as_slice_of_cells();
+        let mut open = Open::new((first..first + len).map(|place| self.ray(place)).collect());
+        if !self.bvh.is_worth_a_stream(len) {
+            let batch = open.batch(first).under(self.conditions());
+            for (index, state) in states.iter_mut().enumerate() {
+                batch.with_condition(index, |condition| {
+                    let (ray, visit) = (&open.rays[index], &mut |hit| visit(state, hit));
+                    (self.bvh).visit_ahead(&mut memory.ahead, ray, condition, visit)
+                });
+            }
+            return;
+        }
+        let mut visited = 0;
+        let mut goes_on = |place: usize, hit: &Hit| {
+            visited += 1;
+            visit(&mut states[place], hit.told()) == Visit::Reject
+        };
+        if !so_far.are_many() {
+            let (mut found, mut closest) = (vec![None; len], vec![None; len]);
+            let cells = Cell::from_mut(&mut found[..]).as_slice_of_cells();
             let report =
                 |index: usize, _: &Ray, found: &LocatedHit| cells[index].set(Some(found.hit));
-            let batch = RayBatch::by_keys(&rays, first, &keys)
-                .under(self.conditions())
-                .behind((after.len() == open).then_some(&after[..]))
-                .reporting(Report::Surface(&report));
-            self.bvh.intersect_many(memory, &batch, &mut hits[..open]);
-            after.clear();
-            for index in 0..open {
-                let Some(hit) = found[index] else { continue };
-                let state = &mut states[keys[index].index()];
-                if visit(state, hit.told()) == Visit::Reject {
-                    // Those that go on move to the front.
-                    let next = after.len();
-                    (rays[next], keys[next]) = (rays[index], keys[index]);
-                    after.push(hit);
-                }
-            }
-            rays.truncate(after.len());
-            keys.truncate(after.len());
+            let batch = open.batch(first).under(self.conditions());
+            let batch = batch.reporting(Report::Surface(&report));
+            self.bvh.intersect_many(memory, &batch, &mut closest);
+            open.retain(|index, place| found[index].filter(|hit| goes_on(place, hit)));
         }
+        let mut lists = vec![NearestHits::default(); open.rays.len()];
+        let pending: Vec<u32> = (0..lists.len() as u32).collect();
+        while !open.rays.is_empty() {
+            let len = open.rays.len();
+            let batch = open.batch(first).under(self.conditions());
+            let batch = batch.behind(&open.after);
+            (self.bvh).stream_of::<Nearest, true>(
+                memory,
+                &batch,
+                &pending[..len],
+                &mut lists[..len],
+            );
+            open.retain(|index, place| {
+                let list = &lists[index];
+                let is_open = list.hits().iter().all(|hit| goes_on(place, hit));
+                list.last().filter(|_| is_open)
+            });
+        }
+        so_far.add(len, visited);
+    }
+}
+
+/// Rays whose visit goes on.
+struct Open {
+    rays: Vec<Ray>,
+    /// Their places.
+    keys: Vec<Key>,
+    /// The hit of each behind which its visit goes on.
+    after: Vec<Hit>,
+}
+
+impl Open {
+    /// All of these rays.
+    fn new(rays: Vec<Ray>) -> Self {
+        /// A hit before all hits.
+        const FIRST: Hit = Hit {
+            t: f32::NEG_INFINITY,
+            ..Hit::none(0.0)
+        };
+        Self {
+            keys: (0..rays.len()).map(Key::at).collect(),
+            after: vec![FIRST; rays.len()],
+            rays,
+        }
+    }
+
+    /// The rays as a part of a batch that begins at this place.
+    fn batch(&self, first: usize) -> RayBatch<'_> {
+        RayBatch::by_keys(&self.rays, first, &self.keys)
+    }
+
+    /// Keeps the rays for which there is a hit behind which the visit goes on. `goes_on` is called with indices and places.
+    fn retain(&mut self, mut goes_on: impl FnMut(usize, usize) -> Option<Hit>) {
+        let mut next = 0;
+        for index in 0..self.rays.len() {
+            if let Some(hit) = goes_on(index, self.keys[index].index()) {
+                (self.rays[next], self.keys[next]) = (self.rays[index], self.keys[index]);
+                self.after[next] = hit;
+                next += 1;
+            }
+        }
+        self.rays.truncate(next);
+        self.keys.truncate(next);
+        self.after.truncate(next);
+    }
+}
+
+/// Hits that earlier rays of a batch visited: where they are many, the first one is not found by itself. Answers do not depend
+/// on it.
+#[derive(Default)]
+struct HitsSoFar {
+    rays: AtomicUsize,
+    hits: AtomicUsize,
+}
+
+impl HitsSoFar {
+    fn are_many(&self) -> bool {
+        let [rays, hits] = [&self.rays, &self.hits].map(|count| count.load(Ordering::Relaxed));
+        hits > 2 * rays
+    }
+
+    fn add(&self, rays: usize, hits: usize) {
+        self.rays.fetch_add(rays, Ordering::Relaxed);
+        self.hits.fetch_add(hits, Ordering::Relaxed);
     }
 }

@@ -64,6 +64,12 @@ impl Conditions<'_> {
         self.by_name(place).may_count(id)
     }
 
+    /// Whether a hit of the ray at this place, on a primitive that may count, counts.
+    #[inline(always)]
+    pub fn accepts(&self, place: usize, hit: &Hit) -> bool {
+        self.filter.is_none_or(|filter| filter(place, hit))
+    }
+
     /// Condition of the ray at this place, without the filter.
     #[inline(always)]
     fn by_name(&self, place: usize) -> Condition<'_> {

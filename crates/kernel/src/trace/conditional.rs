@@ -123,6 +123,17 @@ pub(crate) fn named(id: PrimRef, ray: &RaySetup) -> PrimId {
     }
 }
 
+/// A hit as users know it, where the ray is: in the instance of this interval, or in the world.
+#[inline(always)]
+pub(crate) fn reported(hit: Hit, ray: &RaySetup, interval: Interval) -> Hit {
+    let hit = Hit {
+        t: interval.clamp(hit.t),
+        inst_id: ray.inst_id,
+        ..hit
+    };
+    hit.told()
+}
+
 /// [Occlusion](crate::trace::query::Occlusion) by what meets a condition.
 struct OcclusionIf<'a>(core::marker::PhantomData<&'a ()>);
 
@@ -194,7 +205,7 @@ impl Known<'_> {
                     None => B::OCCLUDERS_ARE_SURE || block.occludes(lane, ray, filters),
                     Some(accept) => {
                         let hit = block.hit(lane, ray, filters, QueryKind::Occluded);
-                        hit.is_some_and(|hit| accept(&self.reported(hit, ray)))
+                        hit.is_some_and(|hit| accept(&reported(hit, ray, self.interval)))
                     }
                 }
         })?;
@@ -207,16 +218,6 @@ impl Known<'_> {
             Some(condition) => condition.may_count(id),
             None => id != self.excluded,
         }
-    }
-
-    /// A hit as users know it.
-    fn reported(&self, hit: Hit, ray: &RaySetup) -> Hit {
-        let hit = Hit {
-            t: self.interval.clamp(hit.t),
-            inst_id: ray.inst_id,
-            ..hit
-        };
-        hit.told()
     }
 }
 

@@ -10,7 +10,7 @@
 //!    `deferred`: their hits of cut-outs; `leaf_places`: how leaves are prefetched.
 //! 6. `packet`: rays that go the same way, side by side.
 //! 7. `instrumented`: one ray after another, in any order (`pick`), while an observer counts or logs (`observe`).
-//! 8. `visit`: all hits of a ray, front to back; `conditional`: occlusion by what meets a `condition`.
+//! 8. `visit`: all hits of a ray, front to back; `several`: the nearest ones, in a stream; `conditional`: occlusion by what meets a `condition`.
 //! 9. `binary`: everything a ray meets in a binary tree.
 //!
 //! Points have queries of their own: `nearest`, what is near one, and `inside`, what is around one.
@@ -42,6 +42,7 @@ pub(crate) mod pick;
 pub(crate) mod query;
 pub(crate) mod ray_batch;
 pub(crate) mod ray_sort;
+pub(crate) mod several;
 pub(crate) mod single;
 pub(crate) mod stack;
 pub(crate) mod step;

@@ -86,8 +86,11 @@ impl<'a> RayBatch<'a> {
     }
 
     /// Only hits behind these count, one for each ray.
-    pub fn behind(self, after: Option<&'a [Hit]>) -> Self {
-        Self { after, ..self }
+    pub fn behind(self, after: &'a [Hit]) -> Self {
+        Self {
+            after: Some(after),
+            ..self
+        }
     }
 
     /// Neighbours are occluded by the same things, mostly.
@@ -138,7 +141,7 @@ impl<'a> RayBatch<'a> {
     /// Whether all that counts is which primitive is hit: [`RayBatch::may_count`] decides.
     #[inline(always)]
     pub fn decides_by_name(&self) -> bool {
-        self.after.is_none() && self.conditions.is_none_or(Conditions::are_by_name)
+        self.conditions.is_none_or(Conditions::are_by_name)
     }
 
     /// Whether hits of a ray on a primitive can count.
@@ -147,6 +150,15 @@ impl<'a> RayBatch<'a> {
         match self.conditions {
             None => true,
             Some(conditions) => conditions.may_count(self.place(index), id),
+        }
+    }
+
+    /// Whether a hit of a ray, on a primitive that may count, counts.
+    #[inline(always)]
+    pub fn accepts(&self, index: usize, hit: &Hit) -> bool {
+        match self.conditions {
+            None => true,
+            Some(conditions) => conditions.accepts(self.place(index), hit),
         }
     }
 

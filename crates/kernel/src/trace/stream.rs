@@ -26,14 +26,15 @@
 
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
-use crate::geometry::cutout::CutoutBlock;
+use crate::geometry::QueryKind;
+use crate::geometry::cutout::{CutoutBlock, Filters};
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
-use crate::geometry::triangle::LanesOf;
+use crate::geometry::triangle::{LanesOf, TriangleBlock};
 use crate::trace::condition::Condition;
-use crate::trace::conditional::named;
+use crate::trace::conditional::{named, reported};
 use crate::trace::deferred::Deferred;
 use crate::trace::leaf_places::LeafPlaces;
 use crate::trace::pick::Children;
@@ -142,7 +143,7 @@ impl<Q: StreamQuery, const N: usize, const CAREFUL: bool> WithSimd<N>
             prefetch: self.prefetch,
             batch: self.batch,
             decides: CAREFUL && self.batch.decides(),
-            by_name: CAREFUL && !Q::CONFIRMS && self.batch.decides_by_name(),
+            by_name: CAREFUL && self.batch.decides_by_name(),
             pending: self.pending.iter(),
             answers: self.answers,
             items: self.items,
@@ -238,6 +239,18 @@ fn confirm_when<Q: StreamQuery, const N: usize>(
     improved
 }
 
+/// Whether the filter of a batch accepts the hit on a triangle that may count.
+#[inline(never)]
+fn accepts(
+    (batch, index): (&RayBatch<'_>, usize),
+    (block, lane): (&TriangleBlock, usize),
+    (ray, interval): (&RaySetup, Interval),
+    filters: &Filters,
+) -> bool {
+    let hit = block.hit(lane, ray, filters, QueryKind::Occluded);
+    hit.is_some_and(|hit| batch.accepts(index, &reported(hit, ray, interval)))
+}
+
 /// Reports the hit of a ray.
 #[inline(never)]
 fn report_surface<Q: StreamQuery>(
@@ -266,7 +279,7 @@ struct Flight<'a, S, Q: StreamQuery, const N: usize, const CAREFUL: bool> {
     batch: &'a RayBatch<'a>,
     /// Whether the stream decides about every hit.
     decides: bool,
-    /// Whether it decides about occluders, by which primitive it is.
+    /// Whether it decides by which primitive it is.
     by_name: bool,
     /// Indices of the rays to come.
     pending: core::slice::Iter<'a, u32>,
@@ -548,13 +561,13 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
         }
     }
 
-    /// Decides which lanes of a leaf that are left meet the condition of their ray: at hand where names of triangles are all
-    /// that counts, which are surely hit.
+    /// Decides which lanes of a leaf that are left meet the condition of their ray: at hand for occlusion by triangles, which
+    /// are surely hit.
     #[inline(always)]
     fn confirm_leaf(&mut self, id: usize) {
         let lanes = self.lanes[id];
         let block = match self.leaf(id) {
-            Some(leaf) if self.by_name && leaf.kind == PrimKind::Triangle => {
+            Some(leaf) if !Q::CONFIRMS && leaf.kind == PrimKind::Triangle => {
                 &self.bvh.blocks.triangles[leaf.index]
             }
             _ => return self.confirm_when(id, lanes),
@@ -562,7 +575,12 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
         let index = self.ray_indices[id];
         for lane in LanesOf(lanes) {
             let occluder = named(block.id(lane), &self.setups[id]);
-            if self.batch.may_count(index, occluder) {
+            if self.batch.may_count(index, occluder)
+                && (self.by_name || {
+                    let ray = (&self.setups[id], self.spaces[id].interval);
+                    accepts((self.batch, index), (block, lane), ray, &self.bvh.filters)
+                })
+            {
                 let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
                 Q::occlude(&mut self.states[id], &mut stack);
                 self.tops[id] = stack.top();

@@ -238,11 +238,18 @@ impl<'a> CutoutHit<'a> {
         known.unwrap_or_else(|| self.block.ask(self.lane, [u, v], query, ray, filters))
     }
 
+    /// The hit, if it counts.
+    #[inline(always)]
+    pub fn hit(&self) -> Hit {
+        self.block.triangles.hit_at(self.lane, self.values)
+    }
+
     /// Replaces `best` by this hit if it counts and precedes it, and returns whether it did. The filter costs the most,
     /// so it is asked last.
     #[inline(always)]
     pub fn improves(&self, best: &mut Best, ray: &RaySetup, filters: &Filters) -> bool {
-        let hit = self.block.triangles.hit_at(self.lane, self.values);
-        best.offer_if(hit, || self.counts(QueryKind::Intersect, ray, filters))
+        best.offer_if(self.hit(), || {
+            self.counts(QueryKind::Intersect, ray, filters)
+        })
     }
 }
