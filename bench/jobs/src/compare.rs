@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::fmt;
 
-use antumbra::Bvh;
+use antumbra::{Bvh, Recipe};
 
 use crate::input::Mesh;
 use crate::rtc::Rtc;
@@ -37,10 +37,21 @@ pub struct Row {
     calls: &'static str,
 }
 
-/// Runs both programs, builds included. `embree` does one part in so many of the job.
+/// Runs both programs, builds included, ours with default trees. `embree` does one part in so many of the job.
 pub fn compare<T, W: Copy>(
     rtc: &Rtc,
     mesh: &Mesh,
+    ours: impl Fn(&Bvh) -> T,
+    ways: &Ways<W>,
+    embree: impl Fn(W, usize) -> T,
+) -> Compared<T> {
+    compare_on(rtc, (mesh, &Recipe::default()), ours, ways, embree)
+}
+
+/// [`compare`], with our trees by a recipe.
+pub fn compare_on<T, W: Copy>(
+    rtc: &Rtc,
+    (mesh, recipe): (&Mesh, &Recipe),
     ours: impl Fn(&Bvh) -> T,
     ways: &Ways<W>,
     embree: impl Fn(W, usize) -> T,
@@ -70,7 +81,7 @@ pub fn compare<T, W: Copy>(
             "ours".into(),
             Box::new(|| {
                 let start = seconds();
-                let bvh = crate::build(mesh);
+                let bvh = crate::build(mesh, recipe);
                 builds[0].borrow_mut().push(seconds() - start);
                 *results[0].borrow_mut() = Some(ours(&bvh));
             }),

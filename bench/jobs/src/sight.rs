@@ -1,10 +1,10 @@
 //! Visibility between points, and of a terrain from one point.
 
-use antumbra::{Bvh, Ray};
+use antumbra::{Bvh, Ray, Recipe};
 use antumbra_bake::{sees_each_other, sees_points};
 
 use crate::Outcome;
-use crate::compare::compare;
+use crate::compare::{compare, compare_on};
 use crate::input::{Mesh, along_curve, dot, less, origin_offset};
 use crate::rtc::{CALLS, Rtc};
 
@@ -76,7 +76,7 @@ pub fn viewshed(rtc: &Rtc, side: u32) -> Outcome {
         );
         seen
     };
-    let compared = compare(rtc, &mesh, ours, &CALLS, embree);
+    let compared = compare_on(rtc, (&mesh, &Recipe::fast()), ours, &CALLS, embree);
     let differ = different_bits(&compared.ours, &compared.embree);
     Ok(compared.row(targets.len() as u64, targets.len(), differ))
 }

@@ -42,6 +42,11 @@ pub enum Error {
         /// Indices must be below this.
         objects: usize,
     },
+    /// An object holds an instance of itself, or of an object that holds it.
+    NestsItself {
+        /// The object.
+        object: u32,
+    },
     /// More geometries or primitives than 32-bit ids, or leaf references, can name.
     TooMany {
         /// Plural of the things counted.
@@ -153,6 +158,12 @@ impl fmt::Display for Error {
                 f,
                 "instance {inst_id} places object {object}, but there are {objects} objects"
             ),
+            Self::NestsItself { object } => {
+                write!(
+                    f,
+                    "object {object} holds an instance of itself, directly or by others"
+                )
+            }
             Self::TooMany { what, found, limit } => write!(
                 f,
                 "{found} {what} are more than the {limit} that can be numbered"

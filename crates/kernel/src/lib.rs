@@ -138,7 +138,7 @@ pub use geometry::primitives::Primitives;
 pub use geometry::primitives::dropped::{DropReason, Dropped};
 pub use geometry::{
     CubicSegments, CurveBasis, Curves, Disk, Functions, Geometry, GeometryId, Instance,
-    LocalOrigin, QuadMesh, Sphere, TriangleMesh, UserGeometry, UserHit,
+    LocalOrigin, NestedInstances, QuadMesh, Sphere, TriangleMesh, UserGeometry, UserHit,
 };
 pub use monitor::BuildMonitor;
 pub use prim_id::PrimId;

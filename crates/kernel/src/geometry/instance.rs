@@ -11,8 +11,8 @@ use crate::tree::words::{Sink, Words};
 
 /// One placement of an object; its place in the list given to the builder is the `inst_id`.
 ///
-/// An instance holds an object, and an object holds geometries: instances cannot be nested. Multiply the
-/// transforms of nested ones and give the products.
+/// An instance holds an object, and an object holds geometries. [`NestedInstances`](crate::NestedInstances) makes instances of
+/// objects that hold instances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Instance {
@@ -62,6 +62,18 @@ impl Affine {
     pub fn cofactors(&self) -> [[f64; 3]; 3] {
         let [p, q, r] = self.rows.map(|[a, b, c, _]| [a, b, c]);
         [cross(q, r), cross(r, p), cross(p, q)]
+    }
+
+    /// This map after another.
+    pub fn times(&self, first: &Self) -> Self {
+        let columns = [0, 1, 2].map(|column| self.vector(first.rows.map(|row| row[column])));
+        let moved = self.point(first.rows.map(|row| row[3]));
+        Self {
+            rows: [0, 1, 2].map(|row| {
+                let [x, y, z] = columns.map(|column| column[row]);
+                [x, y, z, moved[row]]
+            }),
+        }
     }
 
     /// The inverse; `None` unless there is one, as far as double precision can tell.

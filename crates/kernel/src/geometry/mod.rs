@@ -11,7 +11,7 @@
 //!   which users give boxes and functions;  `cubic`: cubic curves as segments
 //! - `cutout`: leaves of partly transparent triangles; in it `opacity`, the filters of users, and `micromap`, which
 //!   tells where no filter need be asked
-//! - `instance`: objects placed in the world;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready;
+//! - `instance`: objects placed in the world;  `nested`: objects in objects;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready;
 //!   `slab_test`: boxes
 //! - `best`: the best hit so far
 //! - `sound`: which primitives can be kept;  `moved`: geometry whose vertices moved
@@ -35,6 +35,7 @@ pub(crate) mod masks;
 pub(crate) mod moved;
 pub(crate) mod near_test;
 pub(crate) mod nearest;
+mod nested;
 pub(crate) mod primitives;
 pub(crate) mod quad;
 pub(crate) mod ray_setup;
@@ -60,6 +61,7 @@ pub use disk::Disk;
 pub use functions::{Functions, GeometryId};
 pub use instance::Instance;
 pub use local::LocalOrigin;
+pub use nested::NestedInstances;
 pub use user::{UserGeometry, UserHit};
 
 /// Primitives per leaf, and so per leaf block.

@@ -154,7 +154,12 @@ pub(crate) trait StreamQuery: Query {
 /// triangles: 2 % of the instructions of occlusion in batches (AVX2).
 #[cold]
 #[inline(never)]
-fn other_lanes<const N: usize>(bvh: &WideTree<N>, leaf: Leaf, ray: &RaySetup, limit: f32) -> u32 {
+pub(super) fn other_lanes<const N: usize>(
+    bvh: &WideTree<N>,
+    leaf: Leaf,
+    ray: &RaySetup,
+    limit: f32,
+) -> u32 {
     on_leaf!(bvh, leaf, block => block.candidates::<Scalar, false>(Scalar, ray, limit).0)
 }
 

@@ -7,13 +7,14 @@ use crate::geometry::cutout::opacity::QueryKind;
 use crate::geometry::cutout::{CutoutBlock, CutoutHit, Filters};
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::leaf_block::LeafBlock;
+use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::{LanesOf, VectorHits};
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
 use crate::trace::conditional::named;
-use crate::trace::query::{Closest, Query, StreamQuery};
+use crate::trace::query::{Closest, Query, StreamQuery, other_lanes};
 use crate::trace::stack::Stack;
 use crate::tree::leaves::on_leaf;
 use crate::tree::node::Leaf;
@@ -64,7 +65,8 @@ impl Default for NearestHits {
     }
 }
 
-/// Which hits are the nearest? [`Closest`], where the last hit of a full list is the one to precede.
+/// Which hits are the nearest? [`Closest`], where the last hit of a full list is the one to precede. Visits children in the
+/// order of occlusion, as few lists get full and nothing behind a hit can be left out before.
 pub(crate) struct Nearest;
 
 /// Knowledge of a ray on its way.
@@ -78,21 +80,18 @@ pub(crate) struct Found {
 impl Found {
     /// Takes a hit, where the ray is now, if it precedes the last one and counts.
     #[inline(always)]
-    fn offer_if(&mut self, hit: Hit, counts: impl FnOnce(&Hit) -> bool) -> bool {
-        let Some(hit) = self.last.preceded_by(hit).filter(counts) else {
-            return false;
-        };
-        self.nearest.insert(hit);
-        let last = self.nearest.last();
-        if let Some(last) = last {
-            self.last.take(last);
+    fn offer_if(&mut self, hit: Hit, counts: impl FnOnce(&Hit) -> bool) {
+        if let Some(hit) = self.last.preceded_by(hit).filter(counts) {
+            self.nearest.insert(hit);
+            if let Some(last) = self.nearest.last() {
+                self.last.take(last);
+            }
         }
-        last.is_some()
     }
 }
 
 impl Query for Nearest {
-    type Item = u64;
+    type Item = u32;
     type State = Found;
     type Answer = NearestHits;
 
@@ -121,7 +120,7 @@ impl Query for Nearest {
 
     fn leaf<S: Simd, const N: usize>(
         found: &mut Found,
-        stack: &mut Stack<'_, u64>,
+        stack: &mut Stack<'_, u32>,
         _: S,
         bvh: &WideTree<N>,
         leaf: Leaf,
@@ -156,20 +155,24 @@ impl StreamQuery for Nearest {
     #[inline(always)]
     fn leaf_in_stream<S: Simd, const N: usize>(
         found: &mut Found,
-        stack: &mut Stack<'_, u64>,
+        _: &mut Stack<'_, u32>,
         simd: S,
         bvh: &WideTree<N>,
         leaf: Leaf,
         ray: &RaySetup,
-        decides: bool,
+        _: bool,
     ) -> u32 {
-        Closest::leaf_in_stream(&mut found.last, stack, simd, bvh, leaf, ray, decides)
+        if leaf.kind == PrimKind::Triangle {
+            let block = &bvh.blocks.triangles[leaf.index];
+            return block.candidates::<S, true>(simd, ray, found.last.limit).0;
+        }
+        other_lanes(bvh, leaf, ray, found.last.limit)
     }
 
     #[inline(always)]
     fn confirm<S: Simd, const N: usize>(
         found: &mut Found,
-        stack: &mut Stack<'_, u64>,
+        stack: &mut Stack<'_, u32>,
         _: S,
         bvh: &WideTree<N>,
         lanes: (Leaf, u32),
@@ -188,24 +191,20 @@ impl StreamQuery for Nearest {
 
     fn confirm_when<const N: usize>(
         found: &mut Found,
-        stack: &mut Stack<'_, u64>,
+        _: &mut Stack<'_, u32>,
         bvh: &WideTree<N>,
         (leaf, lanes): (Leaf, u32),
         (ray, _): (&RaySetup, Interval),
         condition: &Condition<'_>,
     ) -> (bool, Option<PrimId>) {
-        let mut is_nearer = false;
         on_leaf!(bvh, leaf, block => for lane in LanesOf(lanes) {
             if condition.may_count(named(block.id(lane), ray))
                 && let Some(hit) = block.hit(lane, ray, &bvh.filters, QueryKind::Intersect)
             {
                 let counts = |hit: &Hit| condition.is_behind(hit) && condition.counts(&hit.told());
-                is_nearer |= found.offer_if(hit, counts);
+                found.offer_if(hit, counts);
             }
         });
-        if is_nearer {
-            Closest::cull(&found.last, stack, Scalar);
-        }
         (false, None)
     }
 
@@ -222,16 +221,14 @@ impl StreamQuery for Nearest {
     #[inline(always)]
     fn settle<S: Simd>(
         found: &mut Found,
-        stack: &mut Stack<'_, u64>,
-        simd: S,
+        _: &mut Stack<'_, u32>,
+        _: S,
         hit: &CutoutHit<'_>,
         ray: &RaySetup,
         filters: &Filters,
     ) -> bool {
         let counts = |_: &Hit| hit.counts(QueryKind::Intersect, ray, filters);
-        if found.offer_if(hit.hit(), counts) {
-            Closest::cull(&found.last, stack, simd);
-        }
+        found.offer_if(hit.hit(), counts);
         false
     }
 }

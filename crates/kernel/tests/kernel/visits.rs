@@ -450,6 +450,43 @@ fn only_the_instance_named_is_left_out() {
 }
 
 /// A visit may ask the tree again.
+/// Thirty panes, which is several lists of hits, and enough rays that later ones begin with lists.
+#[test]
+fn rays_of_a_batch_visit_many_hits() {
+    let panes: Vec<Mesh> = (0..30).map(|z| square(1.0 + z as f32)).collect();
+    let geometry: Vec<_> = panes.iter().map(geometry).collect();
+    let bvh = Bvh::build(&geometry, &Recipe::default()).expect("in range");
+    let mut rng = Rng::new(9);
+    let rays: Vec<Ray> = (0..10_000)
+        .map(|_| {
+            let [x, y, _] = rng.point(1.2);
+            Ray::new([x, y, 0.0], [0.0, 0.0, 1.0])
+        })
+        .collect();
+    let decide = |seen: &mut Vec<u32>, hit: Hit, last: usize| {
+        seen.push(hit.geom_id);
+        match (seen.len() >= last, last % 2) {
+            (false, _) => Visit::Reject,
+            (true, 0) => Visit::Accept,
+            (true, _) => Visit::Stop,
+        }
+    };
+    // Where each ray ends: before, in and behind the first list, or nowhere.
+    let last = |index: usize| 1 + index % 41;
+    let mut states: Vec<_> = (0..rays.len()).map(|index| (last(index), vec![])).collect();
+    bvh.batch(&rays)
+        .visit_hits(&mut states, |(last, seen), hit| decide(seen, hit, *last));
+    let mut all = 0;
+    for (index, (ray, (_, seen))) in rays.iter().zip(&states).enumerate() {
+        let mut expected = Vec::new();
+        bvh.query(ray)
+            .visit_hits(|hit| decide(&mut expected, hit, last(index)));
+        assert_eq!(seen, &expected, "ray {index}");
+        all += usize::from(seen.len() == 30);
+    }
+    assert!(all > 500, "{all}");
+}
+
 #[test]
 fn visits_may_be_nested() {
     let bvh = Bvh::build(&[geometry(&square(1.0))], &Recipe::default()).expect("in range");
