@@ -1,4 +1,4 @@
-"""How two workers of dask compare with one thread, by the length of tasks: the program of docs/python/many-machines.md.
+"""How two workers of dask compare with one thread, by the length of tasks: the program of docs/src/python/many-machines.md.
 
     python bench/python/many_machines.py [--rays 2000000,20000000,200000000] [--tasks 8]
 

@@ -1,4 +1,4 @@
-"""The reference of the package, from its docstrings: python reference.py writes docs/python/reference.md."""
+"""The reference of the package, from its docstrings: python reference.py writes docs/src/python/reference.md."""
 
 import inspect
 import pathlib
@@ -9,7 +9,7 @@ import antumbra.embreex
 import antumbra.open3d
 import antumbra.trimesh
 
-PAGE = pathlib.Path(__file__).parents[3] / "docs" / "python" / "reference.md"
+PAGE = pathlib.Path(__file__).parents[3] / "docs" / "src" / "python" / "reference.md"
 
 PARTS = [
     ("Scenes", antumbra, ["Scene", "World", "Queries", "Mesh", "Instance"]),

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import reference
 
-DOCS = pathlib.Path(__file__).parents[3] / "docs" / "python"
+DOCS = pathlib.Path(__file__).parents[3] / "docs" / "src" / "python"
 EXAMPLES = sorted((DOCS / "examples").glob("*.py"))
 
 

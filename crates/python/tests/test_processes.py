@@ -114,7 +114,7 @@ def test_dask_has_the_answers_of_one_process():
 
 
 def test_two_workers_beat_one_thread():
-    """The program of docs/python/many-machines.md, with tasks of about a second."""
+    """The program of docs/src/python/many-machines.md, with tasks of about a second."""
     distributed = pytest.importorskip("dask.distributed")
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     if cores < 2 or (hasattr(os, "getloadavg") and os.getloadavg()[0] > cores - 0.5):
