@@ -135,7 +135,7 @@ def test_types_know_the_texts_that_arguments_take():
 
 def test_programs_on_the_pages_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for page in (DOCS / "README.md", DOCS / "many-machines.md", DOCS.parents[1] / "README.md"):
+    for page in (DOCS / "README.md", DOCS / "many-machines.md", DOCS.parent / "first-python.md", DOCS.parents[2] / "README.md"):
         names = {}
         for part in page.read_text().split("```python\n")[1:]:
             program = part.split("```")[0]
@@ -144,7 +144,7 @@ def test_programs_on_the_pages_run(tmp_path, monkeypatch):
 
 
 def test_the_program_of_the_package_page_runs():
-    text = (DOCS.parents[1] / "crates" / "python" / "README.md").read_text()
+    text = (DOCS.parents[2] / "crates" / "python" / "README.md").read_text()
     program = text.split("```python\n")[1].split("```")[0]
     corners, faces = np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1.0]]), np.array([[0, 1, 2]])
     names = dict(vertices=corners, faces=faces, points=np.zeros((4, 3)), sun=[0.1, 0.1, 1], origins=np.zeros((4, 3)), directions=[0, 0, 1])
