@@ -71,7 +71,7 @@ pub fn run(memory: MemorySize) -> Result<(), Failure> {
     let [width, height] = RESOLUTION;
     tell(format_args!(
         "A city of half a million triangles, three times {width} x {height} pixels. This takes less than a minute, and \
-         writes to {DIRECTORY}/ alone.\n"
+         writes only to {DIRECTORY}/.\n"
     ));
     let (scene, world) = city(memory)?;
     let options = Options {
@@ -165,7 +165,7 @@ fn city(memory: MemorySize) -> Result<(Scene, World), Failure> {
 
 /// Speedups of the learned tree, for shadow rays and for rays to the sky.
 fn gains(world: &World, plain: &KeptTree, tree: &KeptTree) -> Result<[Gain; 2], Failure> {
-    let _timing = crate::progress::doing("", "timing the trees in turns");
+    let _timing = crate::progress::doing("", "timing the trees");
     let rays = collect_rays(world, plain.bvh(), RAYS, 1);
     let compare = |rays: &[Ray]| {
         gain(plain.bvh(), tree.bvh(), rays, TURNS)

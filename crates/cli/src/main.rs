@@ -1,6 +1,6 @@
 //! The program `antumbra`: renders scenes, and compares the orders in which shadow rays visit a tree.
 //!
-//! The program parses, prints and exits. What is asked on the command line becomes calls of the library crates; what
+//! The program parses, prints and exits. The command line becomes calls of the library crates; what
 //! they return becomes text, JSON and files. Text for people goes to the standard error output, results to the
 //! standard output.
 //!

@@ -19,7 +19,7 @@ pub struct AoArgs {
     /// A .ply, .glb or .npz holds a mesh, a .png or .exr a picture or texture. A .ply or .glb has the triangles of all meshes in world space, with normals.
     /// Vertices that are split at creases are in it several times. In a .ply, every vertex has the value
     /// as the float property ao, and as a grey colour of 8 bits; in a .glb, as COLOR_0. A .png or .exr is a picture from the
-    /// camera, which frames a mesh that comes alone, or with --atlas a texture. A .tif (GeoTIFF), .asc or .npy has the values in
+    /// camera, which frames a mesh without a camera, or with --atlas a texture. A .tif (GeoTIFF), .asc or .npy has the values in
     /// the cells of a scene that is a raster. A shard is a .part.
     #[arg(short, long, value_name = "FILE|-", value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: PathBuf,

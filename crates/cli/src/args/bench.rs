@@ -11,7 +11,7 @@ use super::values::{Levels, Orders, ThreadCounts, Trees};
 use super::{SCENE, SCENE_LONG, heading};
 use crate::json::Destination;
 
-/// Flags of `bench`. Defaults are those of the laboratory.
+/// Flags of `bench`. The laboratory has the same defaults.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
     #[arg(value_name = "SCENE", default_value = "builtin:city", help = SCENE, long_help = SCENE_LONG)]

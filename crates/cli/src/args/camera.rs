@@ -1,4 +1,4 @@
-//! Flags about camera, film and light of a picture, of `render` and `view`; those of the camera alone also of `ao` and
+//! Flags about camera, film and light of a picture, of `render` and `view`; flags of the camera only are also in `ao` and
 //! `info`.
 
 use std::path::PathBuf;
@@ -9,14 +9,14 @@ use clap::Args;
 use super::names::one_of;
 use super::{heading, values};
 
-/// Flags about the camera: where it stands, and what part of its picture is wanted.
+/// Flags about the camera: its place, and what part of its picture is wanted.
 #[derive(Debug, Args)]
 #[command(next_help_heading = heading::CAMERA)]
 pub struct PoseArgs {
     /// Camera, as "LookAt ex ey ez ax ay az ux uy uz"
     ///
-    /// Eye, point looked at and up vector, as in a .pbrt file. The word LookAt may be left out. The angle of view stays
-    /// that of the scene, see --fov.
+    /// Eye, point looked at and up vector, as in a .pbrt file. The word LookAt may be left out. The scene's angle
+    /// of view stays, see --fov.
     #[arg(long, value_name = "LOOKAT", allow_hyphen_values = true)]
     pub camera: Option<LookAt>,
     /// Angle of view over the shorter side, in degrees
@@ -29,7 +29,7 @@ pub struct PoseArgs {
     pub up: Option<Up>,
     /// Part of the picture in pixels, as X,Y,WxH
     ///
-    /// X and Y are those of the upper left corner. The image keeps its place in the whole picture.
+    /// X and Y name the upper left corner. The image keeps its place in the whole picture.
     #[arg(long, value_name = "X,Y,WxH", allow_hyphen_values = true)]
     pub crop: Option<Crop>,
 }
@@ -65,7 +65,7 @@ pub struct CameraArgs {
     pub sun: Option<Sun>,
     /// Wide ground just below a mesh
     ///
-    /// The mesh stands on a matt grey plane and throws its shadow on it. Only for meshes.
+    /// A matt grey plane below the mesh takes its shadow. Only for meshes.
     #[arg(long, help_heading = heading::LIGHT)]
     pub ground: bool,
 }

@@ -40,7 +40,7 @@ fn curves() -> Vec<String> {
 }
 
 impl DisplayArgs {
-    /// The values to show, which by default are those of `usual`.
+    /// The values to show, by default from `usual`.
     pub fn display(&self, usual: Display) -> Display {
         Display {
             exposure: self.exposure,
@@ -59,7 +59,7 @@ impl DisplayArgs {
         )))
     }
 
-    /// Writes an image with these values, by default with those of `usual`. Says so if much of it is brighter than white.
+    /// Writes an image with these values, by default the ones of `usual`. Says so if much of it is brighter than white.
     pub fn write(&self, image: &Image, path: &Path, usual: Display) -> Result<(), Failure> {
         let display = self.display(usual);
         let white = (-self.exposure).exp2();

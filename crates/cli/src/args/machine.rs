@@ -33,12 +33,12 @@ pub struct MachineArgs {
 }
 
 impl MachineArgs {
-    /// The instruction set asked for, checked against this CPU.
+    /// The chosen instruction set, checked against this CPU.
     pub fn isa(&self) -> Result<Isa, Failure> {
         self.level.isa()
     }
 
-    /// Starts the threads asked for. Everything parallel uses them from then on.
+    /// Starts the chosen number of threads. Everything parallel uses them from then on.
     pub fn start_threads(&self) -> Result<(), Failure> {
         start_threads(self.threads.and_then(|n| NonZeroUsize::new(n.into())))
     }

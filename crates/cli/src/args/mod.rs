@@ -93,7 +93,7 @@ has lights), a height raster (.tif, .asc or .npy), or a built-in scene as builti
 /// Ray tracing that learns from shadow rays
 ///
 /// Without a command the demonstration runs: it shows a built-in city in sunlight, by its sky and by its sun, times the
-/// learned tree, and writes to antumbra-out/ alone.
+/// learned tree, and writes only to antumbra-out/.
 #[derive(Debug, Parser)]
 #[command(
     name = "antumbra",
@@ -124,10 +124,10 @@ pub struct Cli {
     /// rest is rendered: materials as matte, shapes, lights and media not at all.
     #[arg(long, global = true, conflicts_with = "strict", help_heading = heading::MACHINE)]
     pub skip_unsupported: bool,
-    /// Say errors and warnings alone
+    /// Print only errors and warnings
     #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = heading::MACHINE)]
     pub quiet: bool,
-    /// Say more: all notes, the tree, where the time went
+    /// Print more: all notes, the tree, where the time went
     #[arg(short, long, global = true, help_heading = heading::MACHINE)]
     pub verbose: bool,
 }
@@ -159,7 +159,7 @@ pub enum Command {
     /// begins a new picture at once. The tree learns between pictures. The page can show the tests of shadow rays before
     /// and after learning, and save the picture. Nothing is written by itself.
     ///
-    /// The page is served on 127.0.0.1 alone, and its address is secret.
+    /// The page is served only on 127.0.0.1, and its address is secret.
     View(ViewArgs),
     /// Join the parts of a picture or a bake made by `--shard`
     ///
@@ -173,7 +173,7 @@ pub enum Command {
     /// Compare the work of shadow rays by orders, trees and widths
     ///
     /// Every order is rendered once with the default tree and collapse. Every other tree and collapse is rendered
-    /// once with the default order, and those of the paper with order simple too. The tests of every shadow ray are
+    /// once with the default order, and the paper's trees with order simple too. The tests of every shadow ray are
     /// counted. With --repeat, everything is rendered again without counting, in turn. All images of a scene must be
     /// the same, bit for bit; otherwise the exit code is 1.
     ///
@@ -181,7 +181,7 @@ pub enum Command {
     /// rays, and as many ambient occlusion rays. The answers must be the same, bit for bit.
     ///
     /// --preset paper makes the paper's Tables 2 and 3: its six orders, 4 and 8 children, paths of at most 5 scattering
-    /// events (2 in sanmiguel), the random sampler, 1 sample per pixel and 3 timed renderings, unless told otherwise.
+    /// events (2 in sanmiguel), the random sampler, 1 sample per pixel and 3 timed renderings, unless flags say otherwise.
     ///
     /// An interrupted study with --out continues when the same command is given again.
     Study(StudyArgs),
@@ -193,32 +193,32 @@ pub enum Command {
     Probe(ProbeArgs),
     /// Measure rays per second, side by side with Embree
     ///
-    /// The rays are those of camera paths of up to five bounces: camera rays, shadow rays to the lights, and diffuse
+    /// The rays come from camera paths of up to five bounces: camera rays, shadow rays to the lights, and diffuse
     /// bounces. All engines take turns on one list of rays. Ratios are medians over the rounds.
     ///
     /// Before anything is timed, all answers are compared with a watertight reference, which is compared with brute
     /// force. If an answer of ours is wrong, the exit code is 1.
     ///
-    /// Spheres are traced as meshes, instances as instances. Alpha masks are asked wherever a mesh with one is hit,
+    /// Spheres are traced as meshes, instances as instances. Alpha masks are looked up wherever a mesh with one is hit,
     /// by Embree through its filter functions. Close other programs first.
     Bench(BenchArgs),
     /// Bake ambient occlusion: of vertices, a texture or a picture
     ///
-    /// The value is the open part of the sky above a point: 1 where nothing is in the way, 0 where all is closed. Normals are
-    /// those of the file. Without them, they are means of the triangles around a vertex, weighted by area, and vertices are
+    /// The value is the open part of the sky above a point: 1 where nothing is in the way, 0 where all is closed. Normals come
+    /// from the file. Without them, they are means of the triangles around a vertex, weighted by area, and vertices are
     /// split where triangles meet at more than 40 degrees. So a corner of a roof has the open sky of the roof, and its copies
     /// have what the walls see. The file has the same bytes for any number of threads and shards.
     Ao(AoArgs),
     /// Bake hours of direct sun, sky view factors and irradiation
     ///
-    /// Each sensor is asked about every sun and every patch of the sky. Example, for a year in hours:
+    /// Each sensor traces a ray to every sun and every patch of the sky. Example, for a year in hours:
     ///
     /// antumbra sun city.ply --grid 2 --lat 48.2 --lon 16.4 --timezone 1 -o hours.csv -o hours.png
     ///
-    /// Suns stand where the algorithm of NREL has them. Light that surfaces reflect is left out.
+    /// Suns are where the algorithm of NREL has them. Light that surfaces reflect is left out.
     #[command(override_usage = "antumbra sun [OPTIONS] -o <OUT> <SENSORS> <SCENE>")]
     Sun(SunArgs),
-    /// Tell which points see each other, and what observers see
+    /// Find which points see each other, and what observers see
     ///
     /// Points see each other if nothing lies between them. With --viewshed, the result is how many points of
     /// A.csv see each place of the mesh.

@@ -28,8 +28,8 @@ pub struct PictureArgs {
     pub integrator: Option<IntegratorKind>,
     /// Shadow rays per camera ray, or samples per light
     ///
-    /// The former for ambientocclusion, the latter for directlighting, where lights without a size are asked by one
-    /// ray. Refused for path, which asks one light once at every vertex.
+    /// The former for ambientocclusion, the latter for directlighting, where lights without a size get one
+    /// ray. Refused for path, which samples one light once at every vertex.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     pub samples: Option<u32>,
     /// Longest occlusion ray [default: any]

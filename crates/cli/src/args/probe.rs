@@ -38,7 +38,7 @@ pub struct ProbeArgs {
         value_parser = clap::value_parser!(u32).range(1..=1 << 20)
     )]
     pub log_rays: u32,
-    /// Rounds of timing; 0: counts alone
+    /// Rounds of timing; 0: only counts
     #[arg(
         long, value_name = "N", default_value_t = 7, help_heading = heading::WORK,
         value_parser = clap::value_parser!(u32).range(..=10_000)

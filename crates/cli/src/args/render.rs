@@ -18,7 +18,7 @@ use crate::json::Destination;
 pub struct UntilArgs {
     /// Add samples for so long, as 90s, 5m or 1h
     ///
-    /// Samples per pixel are doubled while the next step fits into the time, as the last one tells. --spp is the largest
+    /// Samples per pixel are doubled while the next step fits into the time, judged by the last one. --spp is the largest
     /// number then. The last step is always finished. Time before an interruption counts. Textures are averaged as for 64
     /// samples per pixel, whatever their number.
     #[arg(long, value_name = "T", conflicts_with_all = ["shard", "keep_samples", "load_order"])]
@@ -69,7 +69,7 @@ pub struct RenderArgs {
     /// Albedo, normals, position, depth in the .exr
     ///
     /// Layers Albedo, N (geometric) and Ns (shading normal), P, Z (depth), Variance and SampleCount, beside the colours.
-    /// They are means over the first surfaces of up to 64 samples. Normals and positions are those of the world.
+    /// They are means over the first surfaces of up to 64 samples. Normals and positions are in world coordinates.
     #[arg(long, conflicts_with = "shard", help_heading = heading::OUTPUT)]
     pub layers: bool,
     /// Names of layers: pbrt or cycles
@@ -77,7 +77,7 @@ pub struct RenderArgs {
     pub aov_names: AovNames,
     /// Scene, camera, samples, seed, order in the .exr
     ///
-    /// They stand in the attribute comments, with the version of the program. --layers implies it. Without it, equal
+    /// They are in the attribute comments, with the version of the program. --layers implies it. Without it, equal
     /// pictures are equal files.
     #[arg(long, conflicts_with = "shard", help_heading = heading::OUTPUT)]
     pub metadata: bool,
@@ -107,13 +107,13 @@ pub struct RenderArgs {
     pub load_order: Option<PathBuf>,
     /// Go on from the checkpoint: the default
     ///
-    /// The image gets the same bits as without the interruption. Without a checkpoint the rendering starts afresh. A
+    /// The image gets the same bits as without the interruption. Without a checkpoint the rendering starts again. A
     /// checkpoint of another picture is refused.
     #[arg(long, help_heading = heading::CHECKPOINTS)]
     pub resume: bool,
     /// Forget the checkpoint beside the image
     ///
-    /// The rendering starts afresh, and replaces the checkpoint or part of an earlier one.
+    /// The rendering starts again, and replaces the checkpoint or part of an earlier one.
     #[arg(long, conflicts_with = "resume", help_heading = heading::CHECKPOINTS)]
     pub restart: bool,
     /// Keep the samples beside the finished image

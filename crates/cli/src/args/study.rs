@@ -31,7 +31,7 @@ pub struct StudyArgs {
     /// Work that an interrupted study of the same command has finished there is not done again.
     #[arg(long, requires = "out", conflicts_with = "restart", help_heading = heading::OUTPUT)]
     pub resume: bool,
-    /// Begin anew in the directory of --out
+    /// Begin again in the directory of --out
     ///
     /// Work that an interrupted study has finished there is forgotten.
     #[arg(long, requires = "out", help_heading = heading::OUTPUT)]
@@ -86,10 +86,10 @@ pub struct StudyArgs {
     pub replay: Option<u32>,
     /// Rounds of timing, and pictures rendered apart [0]
     ///
-    /// Shadow rays of all trees are timed in turns, N times and once at least. The whole-picture time of a tree is
+    /// Shadow rays of all trees are timed interleaved, N times and once at least. The whole-picture time of a tree is
     /// composed of its own queries and learning and of the shading that all trees share. With N, whole pictures of the
-    /// default and of the paper's unsorted trees are also rendered apart N times, in turns. Preset paper has 3 unless
-    /// told otherwise.
+    /// default and of the paper's unsorted trees are also rendered separately N times, interleaved. Preset paper has 3 unless
+    /// flags say otherwise.
     #[arg(
         long, value_name = "N", help_heading = heading::WORK,
         value_parser = clap::value_parser!(u32).range(..=1000)

@@ -119,12 +119,12 @@ pub struct SunArgs {
     pub en17037: bool,
     /// Minutes from sun to sun
     ///
-    /// Each sun stands for the step around it: the sun is that of the middle of the step.
+    /// Each sun stands for the step around it: the sun of the middle of the step.
     #[arg(long, value_name = "MINUTES", default_value_t = 60.0, value_parser = values::positive, help_heading = heading::SUN)]
     pub step: f64,
     /// 145, 577, 2305 or uniform:N
     ///
-    /// 145 are those of Tregenza, 577 and 2305 those of Reinhart. uniform:N are N patches of the same size.
+    /// 145 are by Tregenza, 577 and 2305 by Reinhart. uniform:N are N patches of the same size.
     #[arg(long, value_name = "PATCHES", default_value = "145", value_parser = sky, help_heading = heading::SUN)]
     pub sky: SkyDivision,
     #[command(flatten)]

@@ -103,7 +103,7 @@ pub struct CollapsesArgs {
 }
 
 impl CollapsesArgs {
-    /// The collapses, by default that of a recipe.
+    /// The collapses, by default the collapse of a recipe.
     pub fn or(&self, recipe: &Recipe) -> Vec<Collapse> {
         let list = self.collapses.as_ref();
         list.map_or(vec![recipe.collapse], |list| list.0.clone())
@@ -136,7 +136,7 @@ pub struct PrefetchArgs {
 }
 
 impl TreeArgs {
-    /// The recipe for a scene, which may ask for an order and a width.
+    /// The recipe for a scene, which may name an order and a width.
     pub fn recipe(&self, scene: &Scene, isa: Isa) -> Recipe {
         let preset = self.preset.preset.recipe();
         let asked = &scene.accelerator;

@@ -134,7 +134,7 @@ impl FromStr for PrefetchChoice {
 pub struct ThreadCounts(pub Vec<Option<NonZeroUsize>>);
 
 impl ThreadCounts {
-    /// Most threads that can be asked for.
+    /// Most threads that can be chosen.
     const MOST: usize = 1024;
 }
 

@@ -22,7 +22,7 @@ pub struct VisibleArgs {
     /// above their surface, and see nothing behind it.
     #[arg(value_name = "A.csv")]
     pub from: PathBuf,
-    /// Points looked at [default: those of A.csv]
+    /// Points looked at [default: the points of A.csv]
     #[arg(value_name = "B.csv", conflicts_with = "surface")]
     pub to: Option<PathBuf>,
     /// Result: .npz, .csv, .ply, .png, .svg, .pdf or .tif

@@ -43,7 +43,7 @@ fn has_anchor(page: &str, anchor: &str) -> bool {
 
 #[test]
 fn links_lead_to_files_and_headings() {
-    let outside = ["README.md", "CHANGELOG.md"];
+    let outside = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "ARCHITECTURE.md"];
     let mut all: Vec<_> = outside.map(|name| root().join(name)).into();
     pages(&root().join("docs"), &mut all);
     let book = root().join("docs/src");
@@ -96,9 +96,11 @@ fn the_summary_lists_every_page_of_the_book() {
     assert_eq!(listed.len(), all.len(), "a page is listed twice or is missing");
 }
 
-fn check(script: &str) {
+/// Runs a script of `bench/` that compares the pages with what they are made from.
+fn check(script: &str, arguments: &[&str]) {
     let mut command = std::process::Command::new("python3");
-    let Ok(found) = command.arg(root().join(script)).arg("--check").output() else {
+    command.arg(root().join(script)).args(arguments);
+    let Ok(found) = command.arg("--check").output() else {
         eprintln!("SKIPPED: no python3");
         return;
     };
@@ -108,10 +110,25 @@ fn check(script: &str) {
 
 #[test]
 fn tables_of_the_pages_are_those_of_the_records() {
-    check("bench/results");
+    check("bench/results", &[]);
 }
 
 #[test]
 fn code_on_the_pages_is_that_of_tested_files() {
-    check("bench/snippets");
+    check("bench/snippets", &[]);
+}
+
+#[test]
+fn pictures_are_drawn_from_the_tables_of_the_pages() {
+    check("bench/pictures", &[]);
+}
+
+#[test]
+fn the_reference_of_commands_says_what_the_help_says() {
+    check("bench/commands", &[env!("CARGO_BIN_EXE_antumbra")]);
+}
+
+#[test]
+fn pages_and_comments_use_the_words_of_the_field() {
+    check("bench/words", &[]);
 }
