@@ -74,6 +74,11 @@ impl Curvature {
         self.factor * (east * east + north * north)
     }
 
+    /// Height that is lost per squared distance: `(1 - k) / (2 R)`.
+    pub fn factor(&self) -> f64 {
+        self.factor
+    }
+
     /// Distances from the centre to the east and north.
     fn plan(&self, point: [f64; 3]) -> [f64; 2] {
         let apart = [0, 1, 2].map(|axis| point[axis] - self.centre[axis]);

@@ -91,6 +91,17 @@ impl Key {
         }
     }
 
+    /// Adds numbers.
+    pub fn numbers(&mut self, numbers: &[f64]) {
+        self.0.update(&(numbers.len() as u64).to_le_bytes());
+        let mut bytes = Vec::with_capacity(8 * numbers.len().min(1 << 12));
+        for piece in numbers.chunks(1 << 12) {
+            bytes.clear();
+            bytes.extend(piece.iter().flat_map(|x| x.to_bits().to_le_bytes()));
+            self.0.update(&bytes);
+        }
+    }
+
     /// Adds a mesh: vertices, and three vertex indices of each triangle.
     pub fn mesh(&mut self, positions: &[[f32; 3]], indices: &[[u32; 3]]) {
         self.vectors(positions);

@@ -26,6 +26,7 @@
 //! | which suns does each point see, and for how long | [`sees_directions`], [`sun_hours`] | [`BitMatrix`], points x suns; `f64` |
 //! | how much energy does each point receive from the sun and the sky | [`SunJob`], [`run`] | [`SunValues`] |
 //! | how much of the light of a surface arrives at others | [`view_factors`] | `f64`, surfaces x surfaces |
+//! | which cells of a height raster does each observer see | [`ViewshedJob`], [`run`] | [`Viewsheds`] |
 //! | which points see each other | [`sees_points`], [`sees_each_other`] | [`BitMatrix`], points x points |
 //!
 //! All of them take slices of `[f32; 3]` in the coordinates of the tree, and a [`Monitor`], which hears of the progress and may
@@ -58,7 +59,7 @@
 //!
 //! # Jobs
 //!
-//! Long bakes are jobs: [`OcclusionJob`], [`SunJob`] and [`VisibilityJob`]. A [`Job`] has numbered items, and [`Work`] computes
+//! Long bakes are jobs: [`OcclusionJob`], [`SunJob`], [`VisibilityJob`] and [`ViewshedJob`]. A [`Job`] has numbered items, and [`Work`] computes
 //! them in chunks, which can be kept in files, resumed, and shared among machines. [`learn_when_it_pays`] makes a tree that
 //! learned from rays of the job. [`Sensors`] and [`Atlas`] make points of meshes, grids, tables and textures.
 //!
@@ -70,6 +71,7 @@
 //! - `ambient_occlusion`: the open part of the sky above points
 //! - `view_factors`: light that goes from surface to surface
 //! - `curvature`: lines of sight over a round earth
+//! - `viewshed`: what observers see of a height field;  `height_field`, `horizon`: its surface and its edges as an eye sees them
 //! - `visibility`: directions and points that points see;  `exposure`: sums of what they see
 //! - `sky`: the sky in patches;  `sun`: where the sun stands;  `moment`, `clock`: dates, times of day and time zones
 //! - `hourly`: values step by step;  `measures`: classes of sunlight, reflected light
@@ -94,6 +96,8 @@ mod epw;
 mod error;
 mod exposure;
 mod glb;
+mod height_field;
+mod horizon;
 mod hourly;
 mod job;
 mod learn;
@@ -116,6 +120,7 @@ mod sun;
 mod sunlight;
 mod table;
 mod view_factors;
+mod viewshed;
 mod visibility;
 mod visibility_job;
 mod work;
@@ -133,6 +138,7 @@ pub use epw::{BadWeather, Record, Weather};
 pub use error::Error;
 pub use exposure::{sky_view, sun_hours};
 pub use glb::write_glb;
+pub use height_field::HeightField;
 pub use hourly::{Hourly, Receipt};
 pub use job::{Job, Key, run};
 pub use learn::{Learned, learn_when_it_pays};
@@ -154,6 +160,7 @@ pub use sun::{Place, Refraction, SunPosition, sun_positions};
 pub use sunlight::{SunFound, SunJob, SunValues, Sunlight, Suns, TimeStep};
 pub use table::BadTable;
 pub use view_factors::view_factors;
+pub use viewshed::{Observer, ViewshedJob, Viewsheds};
 pub use visibility::{SightLines, SightRange, sees_directions, sees_each_other, sees_points};
 pub use visibility_job::{Eyes, VisibilityJob};
 pub use work::Work;
