@@ -126,6 +126,19 @@ impl<'a> HeightField<'a> {
         self.transform
     }
 
+    /// Number of triangles of the surface.
+    pub fn triangles(&self) -> usize {
+        let has = |cell: usize| usize::from(self.rows[cell].is_finite());
+        let squares = (1..self.height)
+            .flat_map(|row| (1..self.width).map(move |column| row * self.width + column));
+        let corners = squares.map(|last| {
+            has(last) + has(last - 1) + has(last - self.width) + has(last - self.width - 1)
+        });
+        corners
+            .map(|corners: usize| corners.saturating_sub(2))
+            .sum()
+    }
+
     /// Side of a square with the area of a cell.
     pub fn unit(&self) -> f64 {
         let [_, a, b, _, d, e] = self.transform;

@@ -39,6 +39,16 @@ impl Sensors {
     /// [`BadTable`] names the first line that is not as it should be: a number is missing, is none, is not finite or has a
     /// decimal comma; a column is there twice; a line has more or fewer columns than the first.
     pub fn from_table(text: &str, local: &LocalOrigin) -> Result<Self, BadTable> {
+        let (mut sensors, points) = Self::and_points_of_table(text)?;
+        sensors.points = points.iter().map(|&point| local.local(point)).collect();
+        Ok(sensors)
+    }
+
+    /// Sensors of a table without their points, and the points in double precision: see [`Sensors::from_table`].
+    ///
+    /// # Errors
+    /// As [`Sensors::from_table`].
+    pub fn and_points_of_table(text: &str) -> Result<(Self, Vec<[f64; 3]>), BadTable> {
         let text = text.trim_start_matches('\u{feff}');
         let lines = (1..).zip(text.lines().map(str::trim));
         let mut lines = lines
@@ -60,6 +70,7 @@ impl Sensors {
             labels: Vec::new(),
             layout: Layout::List,
         };
+        let mut points = Vec::new();
         for (line, text) in lines {
             let fields = fields(text, mark);
             if fields.len() != head.len() {
@@ -77,7 +88,7 @@ impl Sensors {
                 }
             }
             let [x, y, z, nx, ny, nz] = numbers;
-            sensors.points.push(local.local([x, y, z]));
+            points.push([x, y, z]);
             if columns.places[3].is_some() {
                 sensors.normals.push([nx, ny, nz].map(|x| x as f32));
             }
@@ -88,9 +99,9 @@ impl Sensors {
                 label.values.push(fields[place].to_owned());
             }
         }
-        match sensors.points.is_empty() {
+        match points.is_empty() {
             true => Err(none(first)),
-            false => Ok(sensors),
+            false => Ok((sensors, points)),
         }
     }
 }

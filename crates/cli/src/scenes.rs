@@ -10,7 +10,7 @@ use antumbra::{BuildMonitor, Isa, Ray, Width};
 use antumbra_image::{Allowance, Raster, Samples};
 use antumbra_lab::count;
 use antumbra_load::{
-    Diagnostic, Extent, Loaded, MemorySize, Options, Severity, Sky, Stage, Up, Upright,
+    Diagnostic, Extent, Heights, Loaded, MemorySize, Options, Severity, Sky, Stage, Up, Upright,
     check_picture,
 };
 use antumbra_render::{Camera, World};
@@ -82,6 +82,24 @@ pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
         tell(format_args!("note: {}: {feature}", name.display()));
     }
     Ok(loaded)
+}
+
+/// Reads a height raster without making a mesh of it, and prints the reader's warnings.
+pub fn load_heights(name: &Path, max_memory: MemorySize) -> Result<Heights, Failure> {
+    let reading = progress::doing(&name.to_string_lossy(), "reading");
+    let options = Options {
+        max_memory,
+        strict: STRICT.load(Ordering::Relaxed),
+        skip_unsupported: false,
+    };
+    let heights = antumbra_load::load_heights(name, &options);
+    drop(reading);
+    interrupt::check()?;
+    let heights = heights?;
+    for warning in &heights.warnings {
+        say(format_args!("{warning}"));
+    }
+    Ok(heights)
 }
 
 /// The standard input, as far as memory allows.
@@ -353,7 +371,7 @@ pub fn tell_read(loaded: &Loaded, asked: Option<Up>) {
 }
 
 /// A length with four digits.
-fn rounded(length: f64) -> f64 {
+pub fn rounded(length: f64) -> f64 {
     format!("{length:.3e}").parse().unwrap_or(length)
 }
 

@@ -1,16 +1,16 @@
 //! Height rasters as meshes.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use antumbra_mesh::{Warning, plain_material};
-use antumbra_raster::{Grid, companions, read};
+use antumbra_raster::{Grid, Raster, companions, read};
 use antumbra_scene::TriangleMesh;
 use glam::DVec3;
 
-use crate::Error;
 use crate::file::Loaded;
 use crate::stage::{OwnStage, scene_of_mesh};
+use crate::{Error, Extent, Options};
 
 /// Reads a raster as the surface between the centres of its cells, measured from `origin`, within `limit` bytes.
 pub fn load(path: &Path, name: String, limit: u64, origin: DVec3) -> Result<Loaded, Error> {
@@ -31,6 +31,47 @@ pub fn load(path: &Path, name: String, limit: u64, origin: DVec3) -> Result<Load
         raster: Some(Arc::new(cells)),
         inputs: companions(path),
         ..Loaded::plain(scene_of_mesh(name, mesh, plain_material()))
+    })
+}
+
+/// A height raster that was read without making a mesh of it.
+#[derive(Clone, Debug)]
+pub struct Heights {
+    /// Heights and where they are.
+    pub raster: Raster,
+    /// Box around the centres of cells with data, in map coordinates; `None` without data.
+    pub extent: Option<Extent>,
+    /// What speaks against the raster being in one unit of length.
+    pub warnings: Vec<Warning>,
+    /// Other files that were read.
+    pub inputs: Vec<PathBuf>,
+}
+
+/// Reads a height raster (`.tif`, `.asc` or `.npy`) for work that needs no mesh.
+///
+/// # Errors
+/// The file has mistakes, or takes more memory than allowed. With [`Options::strict`], warnings are errors, too.
+pub fn load_heights(path: &Path, options: &Options) -> Result<Heights, Error> {
+    let raster = read(path, options.max_memory.bytes())?;
+    let warnings = warnings(path, &raster.grid);
+    if options.strict && !warnings.is_empty() {
+        return Err(Error::Strict(warnings));
+    }
+    let width = raster.grid.width;
+    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    for (cell, &z) in raster.values.iter().enumerate() {
+        if z.is_finite() {
+            let [x, y] = raster.grid.centre(cell % width, cell / width);
+            let point = DVec3::new(x, y, z);
+            (low, high) = (low.min(point), high.max(point));
+        }
+    }
+    let extent = Extent { low, high };
+    Ok(Heights {
+        raster,
+        extent: (low.x <= high.x).then_some(extent),
+        warnings,
+        inputs: companions(path),
     })
 }
 
@@ -69,7 +110,7 @@ mod tests {
 
     use antumbra_scene::Geometry;
 
-    use crate::{Extent, Options, Up, load};
+    use crate::{Extent, Options, Up, load, load_heights};
 
     #[test]
     fn rasters_are_meshes_in_double_precision() {
@@ -87,7 +128,10 @@ mod tests {
         assert_eq!(mesh.indices.len(), 4);
         let cells = loaded.raster.expect("cells");
         assert_eq!(cells.cells, [0, 1, 2, 3, 4, 5]);
-        assert!(Extent::of(&loaded.scene).is_some() && loaded.warnings.is_empty());
+        let extent = Extent::of(&loaded.scene).expect("an extent");
+        let plain = load_heights(&path, &Options::default()).expect("heights");
+        assert_eq!(plain.extent.expect("an extent").size(), extent.size());
+        assert!(loaded.warnings.is_empty() && plain.raster.values[5] == 6.0);
     }
 
     #[test]

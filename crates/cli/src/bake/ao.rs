@@ -150,7 +150,7 @@ pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Res
         ..Document::new(
             args,
             &bake,
-            bake.head("antumbra.ao/1", isa, &ground),
+            bake.head("antumbra.ao/1", isa, &ground.loaded.scene.name),
             &ground,
         )
     };

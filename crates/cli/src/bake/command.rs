@@ -96,11 +96,21 @@ impl Bake<'_> {
         bvh: &Bvh,
     ) -> Result<Done<J::Found>, Failure> {
         let key = Key::of(job, |key| ground.identify(key));
+        self.compute_known(job, (&ground.loaded.scene.name, key), bvh)
+    }
+
+    /// [`compute`](Self::compute) of a job with a name for the progress and a key of its own.
+    pub fn compute_known<J: Job>(
+        &self,
+        job: &J,
+        (name, key): (&str, u64),
+        bvh: &Bvh,
+    ) -> Result<Done<J::Found>, Failure> {
         let shard = self.chunks.shard;
         let share = shard.map_or([0, 1], |shard| [shard.index(), shard.count()]);
         let mut work = Work::new(job, key, share, std::env::args_os().collect());
         let start = Instant::now();
-        let progress = Progress::new(&ground.loaded.scene.name);
+        let progress = Progress::new(name);
         let checkpoint = match self.parts {
             Some(parts) => {
                 chunks::join(&mut work, parts)?;
@@ -139,11 +149,11 @@ impl Bake<'_> {
     }
 
     /// Beginning of the JSON document.
-    pub fn head<'g>(&self, schema: &'static str, isa: Isa, ground: &'g Ground) -> Head<'g> {
+    pub fn head<'g>(&self, schema: &'static str, isa: Isa, scene: &'g str) -> Head<'g> {
         Head {
             schema,
             machine: version::machine(isa),
-            scene: &ground.loaded.scene.name,
+            scene,
         }
     }
 

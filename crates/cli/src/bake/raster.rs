@@ -64,7 +64,17 @@ pub fn write_cells(
     values: &[f32],
     quantity: Quantity<'_>,
 ) -> Result<(), Failure> {
-    let bytes = antumbra_raster::write(path, &all.grid, &all.spread(values), quantity);
+    write_values(path, &all.grid, &all.spread(values), quantity)
+}
+
+/// Writes values of all cells of a raster.
+pub fn write_values(
+    path: &Path,
+    grid: &Grid,
+    values: &[f32],
+    quantity: Quantity<'_>,
+) -> Result<(), Failure> {
+    let bytes = antumbra_raster::write(path, grid, values, quantity);
     let bytes = bytes.map_err(|error| Failure::Usage(error.to_string()))?;
     output::check_room(path, bytes.len() as u64)?;
     Ok(atomic_write(path, |file| file.write_all(&bytes))?)

@@ -152,7 +152,7 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
         trace_seconds: done.seconds,
         ..Document::new(
             &bake,
-            bake.head("antumbra.sun/1", isa, &ground),
+            bake.head("antumbra.sun/1", isa, &ground.loaded.scene.name),
             &ground,
             &when,
         )

@@ -3,7 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use antumbra::{Aabb, LocalOrigin};
-use antumbra_bake::{Array, BitMatrix, Entry, Eyes, Orientation, Sensors, VisibilityJob, ones};
+use antumbra_bake::{
+    Array, BitMatrix, Curvature, Entry, Eyes, Orientation, Sensors, VisibilityJob, ones,
+};
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
@@ -15,30 +17,31 @@ use super::command::{Bake, Head, text};
 use super::files::{self, Format};
 use super::ground::{self, Earth, Ground};
 use super::map::{self, Plan, Words};
-use super::raster;
+use super::{raster, viewshed};
 use crate::args::VisibleArgs;
 use crate::exit::{Failure, tell};
+use crate::output::Files;
 use crate::{interrupt, json, output};
 
 /// The JSON document.
 #[derive(Serialize)]
-struct Document<'a> {
+pub struct Document<'a> {
     #[serde(flatten)]
-    head: Head<'a>,
-    outputs: Vec<String>,
-    lines: Option<String>,
-    shard: Option<String>,
-    triangles: usize,
+    pub head: Head<'a>,
+    pub outputs: Vec<String>,
+    pub lines: Option<String>,
+    pub shard: Option<String>,
+    pub triangles: usize,
     /// Points that look, and points that are looked at.
-    from: usize,
-    to: usize,
-    viewshed: bool,
-    pairs: u64,
-    visible_pairs: Option<u64>,
-    visible_share: Option<f64>,
-    load_seconds: f64,
-    build_seconds: f64,
-    trace_seconds: f64,
+    pub from: usize,
+    pub to: usize,
+    pub viewshed: bool,
+    pub pairs: u64,
+    pub visible_pairs: Option<u64>,
+    pub visible_share: Option<f64>,
+    pub load_seconds: f64,
+    pub build_seconds: f64,
+    pub trace_seconds: f64,
 }
 
 /// Refuses outputs that cannot be made, before anything is read.
@@ -71,11 +74,11 @@ fn line_format(path: &Path) -> Result<Format, Failure> {
 
 /// Points in question, and their eyes, which are the ends of lines of sight. Places of a viewshed have the rows, since
 /// there are more of them than observers.
-struct Points {
-    rows: Sensors,
+pub struct Points {
+    pub rows: Sensors,
     /// Points of columns; `None` if they are those of the rows.
-    columns: Option<Sensors>,
-    is_viewshed: bool,
+    pub columns: Option<Sensors>,
+    pub is_viewshed: bool,
 }
 
 impl Points {
@@ -185,6 +188,9 @@ pub fn run(
     if args.chunks.shard.is_none() {
         check(args)?;
     }
+    if viewshed::is_of_cells(args) {
+        return viewshed::run(args, isa, memory, parts);
+    }
     let bake = Bake {
         scene: &args.scene,
         outputs: &args.output,
@@ -198,16 +204,7 @@ pub fn run(
             up: args.up,
         }),
     };
-    let from = ("the points", Some(args.from.as_path()));
-    let to = ("the points", args.to.as_deref());
-    let world_files = map::world_files(&args.output);
-    let mut written = vec![("--lines", args.lines.as_deref())];
-    written.extend(
-        world_files
-            .iter()
-            .map(|path| ("the world file", Some(&**path))),
-    );
-    let mut files = bake.declare(&written, &[from, to])?;
+    let mut files = declare(args, &bake)?;
     let ground = bake.ground(isa, memory, &mut files)?;
     let up = ground.up(args.up)?;
     let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
@@ -230,7 +227,7 @@ pub fn run(
         false => counts,
     };
     let mut document = Document {
-        head: bake.head("antumbra.visible/1", isa, &ground),
+        head: bake.head("antumbra.visible/1", isa, &ground.loaded.scene.name),
         outputs: bake.output_names(),
         lines: args.lines.as_deref().map(text),
         shard: bake.shard(),
@@ -267,14 +264,36 @@ pub fn run(
     write(args, &grid, &points, &matrix)?;
     if let Some(path) = &args.lines {
         let _writing = interrupt::writing();
-        lines(path, (args.viewshed, &ground), &job, &matrix)?;
+        let ends = Ends {
+            rows: &rows.points,
+            columns: columns.as_ref().map(|eyes| &eyes.points[..]),
+            curvature: ground.curvature,
+            local: ground.local,
+            is_viewshed: args.viewshed,
+        };
+        lines(path, &ends, &matrix)?;
     }
     document.fill(matrix.count());
     json::write(&document, args.json.as_ref())?;
-    document.tell(&ground);
+    ground.tell("");
+    document.tell();
     bake.tell_done("pairs", document.pairs, document.trace_seconds);
     chunks::forget(done.checkpoint.as_deref());
     Ok(())
+}
+
+/// Notes all files, and checks that outputs can be written.
+pub fn declare(args: &VisibleArgs, bake: &Bake<'_>) -> Result<Files, Failure> {
+    let from = ("the points", Some(args.from.as_path()));
+    let to = ("the points", args.to.as_deref());
+    let world_files = map::world_files(&args.output);
+    let mut written = vec![("--lines", args.lines.as_deref())];
+    written.extend(
+        world_files
+            .iter()
+            .map(|path| ("the world file", Some(&**path))),
+    );
+    bake.declare(&written, &[from, to])
 }
 
 /// Writes all files but the lines of sight.
@@ -333,7 +352,7 @@ fn write(
     args.output.iter().try_for_each(each)
 }
 
-fn npz(
+pub fn npz(
     path: &Path,
     points: &Points,
     local: LocalOrigin,
@@ -358,15 +377,21 @@ fn npz(
     files::npz(path, &entries)
 }
 
+/// Ends of lines of sight.
+pub struct Ends<'a> {
+    pub rows: &'a [[f32; 3]],
+    /// `None` if they are those of the rows.
+    pub columns: Option<&'a [[f32; 3]]>,
+    /// How the points are bent.
+    pub curvature: Option<Curvature>,
+    pub local: LocalOrigin,
+    pub is_viewshed: bool,
+}
+
 /// Writes the pairs that see each other; of points of one list, each pair once.
-fn lines(
-    path: &Path,
-    (is_viewshed, ground): (bool, &Ground),
-    job: &VisibilityJob<'_>,
-    matrix: &BitMatrix,
-) -> Result<(), Failure> {
-    let once = job.columns.is_none();
-    let local = ground.local;
+pub fn lines(path: &Path, ends: &Ends<'_>, matrix: &BitMatrix) -> Result<(), Failure> {
+    let once = ends.columns.is_none();
+    let (local, is_viewshed) = (ends.local, ends.is_viewshed);
     let pairs = || {
         (0..matrix.rows()).flat_map(move |row| {
             let columns = ones(matrix.row(row)).filter(move |&column| !once || column > row);
@@ -384,8 +409,8 @@ fn lines(
             })
         })?);
     }
-    let rows = &job.rows.points[..];
-    let columns = job.columns.map_or(&[][..], |eyes| &eyes.points);
+    let rows = ends.rows;
+    let columns = ends.columns.unwrap_or_default();
     let first = if once { 0 } else { rows.len() };
     let vertices = rows.len() + columns.len();
     output::check_room(path, 24 * vertices as u64 + 8 * count)?;
@@ -399,7 +424,7 @@ fn lines(
              property int vertex1\nproperty int vertex2\nend_header\n"
         )?;
         for point in rows.iter().chain(columns) {
-            let unbent = ground.curvature.map(|curvature| curvature.unbend(*point));
+            let unbent = ends.curvature.map(|curvature| curvature.unbend(*point));
             let point = &unbent.unwrap_or(*point);
             match is_local {
                 true => file.write_all(local.world(*point).map(f64::to_le_bytes).as_flattened())?,
@@ -415,13 +440,12 @@ fn lines(
 
 impl Document<'_> {
     /// Fills in figures about the matrix.
-    fn fill(&mut self, visible: u64) {
+    pub fn fill(&mut self, visible: u64) {
         self.visible_pairs = Some(visible);
         self.visible_share = (self.pairs > 0).then(|| visible as f64 / self.pairs as f64);
     }
 
-    fn tell(&self, ground: &Ground) {
-        ground.tell("");
+    pub fn tell(&self) {
         let visible = self.visible_pairs.unwrap_or_default();
         tell(format_args!(
             "{} of {} pairs see each other ({:.1} %)",
