@@ -70,6 +70,7 @@ struct Materials {
     translucent: usize,
     fourier: usize,
     hair: usize,
+    coated: usize,
     subsurface: usize,
     mix: usize,
     metallic: usize,
@@ -226,7 +227,7 @@ fn materials(scene: &Scene) -> Materials {
             Material::Matte { .. } => &mut counts.matte,
             Material::Plastic { .. } => &mut counts.plastic,
             Material::Mirror { .. } => &mut counts.mirror,
-            Material::Glass { .. } => &mut counts.glass,
+            Material::Glass { .. } | Material::ThinDielectric { .. } => &mut counts.glass,
             Material::Metal { .. } => &mut counts.metal,
             Material::Uber { .. } => &mut counts.uber,
             Material::Substrate { .. } => &mut counts.substrate,
@@ -236,6 +237,7 @@ fn materials(scene: &Scene) -> Materials {
             Material::Subsurface { .. } => &mut counts.subsurface,
             Material::Mix { .. } => &mut counts.mix,
             Material::Metallic { .. } => &mut counts.metallic,
+            Material::CoatedDiffuse { .. } | Material::CoatedConductor { .. } => &mut counts.coated,
             // Bump maps and normal maps are not nested.
             Material::None | Material::Bumped { .. } | Material::NormalMapped { .. } => {
                 &mut counts.none
@@ -279,6 +281,7 @@ impl Materials {
             (self.translucent, "translucent"),
             (self.fourier, "fourier"),
             (self.hair, "hair"),
+            (self.coated, "coated"),
             (self.subsurface, "subsurface"),
             (self.mix, "mix"),
             (self.metallic, "metallic"),

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use antumbra_mesh::{Model, View};
 use antumbra_scene::{
-    Camera, Environment, Film, Geometry, Image, Integrator, Light, Material, Param, Rgb, Sampler,
+    Camera, Environment, EnvironmentMapping, Film, Geometry, Image, Integrator, Light, Material, Param, Rgb, Sampler,
     SamplerKind, Scene, Shape, TriangleMesh,
 };
 use glam::{Mat3, Mat4, Vec3};
@@ -273,6 +273,7 @@ pub fn set_stage(scene: &mut Scene, own: OwnStage, stage: &Stage) {
     scene.lights.push(Light::Infinite {
         radiance: Rgb::ONE,
         environment: Some(Environment {
+            mapping: EnvironmentMapping::LongitudeLatitude,
             image,
             // The middle column is where the camera looks. Columns to the right turn to the right.
             world_from_light: world_from_stage * Mat3::from_cols(Vec3::Z, Vec3::NEG_X, Vec3::Y),

@@ -4,8 +4,8 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use antumbra_scene::{
-    Accelerator, Camera, Film, Filter, Geometry, Instance, Integrator, Light, Material, Medium,
-    MediumInterface, Object, Sampler, Scene, Shape,
+    Accelerator, Camera, Film, Filter, Geometry, Instance, Integrator, Light, LightStrategy,
+    Material, Medium, MediumInterface, Object, Param, Sampler, Scene, Shape,
 };
 use glam::{Affine3, DMat4, DVec3, DVec4};
 
@@ -83,12 +83,22 @@ pub(crate) struct Builder<'o> {
     budget: Budget,
     /// Whether directives are those of pbrt-v4.
     is_version4: bool,
+    /// Time during which the shutter is open, of pbrt-v4.
+    exposure: f32,
+    /// Materials that pbrt-v4 defines after their use: places in the scene's list, and of the first uses.
+    later_materials: HashMap<String, (usize, Span)>,
 }
 
 impl<'o> Builder<'o> {
-    /// Translates directives of pbrt-v4, and takes its default filter.
+    /// Translates directives of pbrt-v4, and takes its default filter and integrator.
     pub fn set_version4(&mut self) {
         self.is_version4 = true;
+        self.state.names_stay = true;
+        self.integrator = Integrator::VolumePath {
+            max_depth: 5,
+            rr_threshold: 1.0,
+            light_strategy: LightStrategy::Spatial,
+        };
         self.filter = Filter::Gaussian {
             radius: [1.5, 1.5],
             alpha: 2.0,
@@ -123,6 +133,8 @@ impl<'o> Builder<'o> {
             pending_meshes: PendingMeshes::default(),
             budget: Budget::new(options.max_memory),
             is_version4: false,
+            exposure: 1.0,
+            later_materials: HashMap::new(),
         }
     }
 
@@ -150,6 +162,9 @@ impl<'o> Builder<'o> {
         self.drop_unused_objects();
         for path in self.images.paths() {
             report.sources.note(path.clone());
+        }
+        if self.is_version4 {
+            self.finish_version4(report);
         }
         self.check_media(end, report);
         let meshes = self.pending_meshes;
@@ -180,6 +195,44 @@ impl<'o> Builder<'o> {
             origin: self.options.origin,
         };
         (scene, times)
+    }
+
+    /// Resolves what pbrt-v4 resolves at the end of a file.
+    fn finish_version4(&mut self, report: &mut Report) {
+        for (name, (index, at)) in std::mem::take(&mut self.later_materials) {
+            match self.state.named_materials.get(&name) {
+                Some(spec) => self.materials[index] = spec.material.clone(),
+                None => report.error_help(
+                    at,
+                    format!("no material is named {name:?}"),
+                    suggest::help(&name, &self.state.named_materials.names()),
+                ),
+            }
+        }
+        self.film.scale *= self.exposure;
+        // Limits are on values as the sensor has them, scales come after.
+        self.film.max_sample_luminance /= self.film.scale;
+        let mut shapes = self.shapes.iter();
+        let passes = |shape: &Shape| {
+            shape.media.is_some() || matches!(self.materials[shape.material], Material::None)
+        };
+        let mut of_objects = self.objects.iter().flat_map(|object| &object.shapes);
+        let is_clear =
+            self.camera.medium.is_none() && !shapes.any(passes) && !of_objects.any(passes);
+        if let Integrator::VolumePath {
+            max_depth,
+            rr_threshold,
+            light_strategy,
+        } = self.integrator
+            && is_clear
+        {
+            // The same picture, without the search for media.
+            self.integrator = Integrator::Path {
+                max_depth,
+                rr_threshold,
+                light_strategy,
+            };
+        }
     }
 
     /// Says where the integrator does not know media. They are left out then, as in pbrt-v3.
@@ -215,6 +268,7 @@ impl<'o> Builder<'o> {
             | D::Integrator(..)
             | D::PixelFilter(..)
             | D::Sampler(..)
+            | D::Option(..)
             | D::TransformTimes
             | D::WorldBegin => Some(Phase::Options),
             D::AreaLightSource(..)
@@ -437,8 +491,13 @@ impl<'o> Builder<'o> {
     }
 
     fn named_material(&mut self, name: &Quoted, report: &mut Report) {
+        self.state.now.later_material = None;
         match self.state.named_materials.get(&name.text) {
             Some(spec) => self.state.now.material = Some(Arc::clone(spec)),
+            // Looked up when the file ends.
+            None if self.is_version4 => {
+                self.state.now.later_material = Some(Arc::new(name.clone()));
+            }
             None => report.tolerated(
                 name.span,
                 format!("no material is named {:?} here", name.text),
@@ -513,9 +572,16 @@ impl<'o> Builder<'o> {
         if !self.budget.take(bytes, at, report) {
             return;
         }
+        let material = match self.state.now.later_material.clone() {
+            Some(name) => self.later_material(&name),
+            None => self.material_index(material),
+        };
+        if area_light.is_some() && matches!(cutouts.alpha, Some(Param::Constant(_))) {
+            report.unsupported(at, "an invisible light (\"alpha\" 0) is");
+        }
         let shape = Shape {
             geometry,
-            material: self.material_index(material),
+            material,
             area_light: area_light.filter(|_| !is_of_object),
             media,
             alpha: cutouts.alpha,
@@ -588,6 +654,35 @@ impl<'o> Builder<'o> {
             })
     }
 
+    /// Index of a material that is defined after its use.
+    fn later_material(&mut self, name: &Quoted) -> usize {
+        let known = self.later_materials.entry(name.text.clone());
+        let (index, _) = *known.or_insert_with(|| {
+            self.materials.push(material::DEFAULT);
+            (self.materials.len() - 1, name.span)
+        });
+        index
+    }
+
+    /// Makes a texture of the image that "normalmap" names in a material of pbrt-v4.
+    fn define_normal_map(&mut self, at: Span, params: &mut Params, report: &mut Report) {
+        if !self.is_version4 {
+            return;
+        }
+        let Some(declaration) = version4::normal_map(params, at, self.texture_space()) else {
+            return;
+        };
+        self.pending_textures.push(declaration);
+        self.define_textures(report);
+    }
+
+    fn texture_space(&self) -> TextureSpace {
+        TextureSpace {
+            world_from_texture: self.state.now.transforms.start,
+            origin: self.options.origin,
+        }
+    }
+
     /// Memory that images may take.
     fn allowance(&self, report: &Report) -> Allowance {
         Allowance::new(self.budget.left(report))
@@ -614,11 +709,14 @@ impl<'o> Builder<'o> {
 impl Handler for Builder<'_> {
     fn directive(&mut self, at: Span, directive: Directive, report: &mut Report) {
         use Directive as D;
-        let directive = if self.is_version4 {
-            version4::translate(directive, report)
-        } else {
-            directive
-        };
+        let mut directive = directive;
+        if self.is_version4 {
+            version4::fill(&mut directive, &self.state);
+            if let Directive::Camera(_, params) = &mut directive {
+                self.exposure = version4::exposure(params, at, report);
+            }
+            directive = version4::translate(directive, report);
+        }
         if !self.check_phase(at, &directive, report) {
             return;
         }
@@ -669,7 +767,10 @@ impl Handler for Builder<'_> {
             D::WorldBegin => self.world_begin(),
             D::WorldEnd => self.world_end(report),
             D::AttributeBegin => self.begin_block(BlockKind::Attribute, at, report),
-            D::AttributeEnd => self.end_block(BlockKind::Attribute, at, report),
+            D::AttributeEnd => {
+                self.end_block(BlockKind::Attribute, at, report);
+                report.color_space = self.state.now.color_space;
+            }
             D::TransformBegin => self.begin_block(BlockKind::Transform, at, report),
             D::TransformEnd => self.end_block(BlockKind::Transform, at, report),
             D::ObjectBegin(name) => self.object_begin(at, name, report),
@@ -691,16 +792,24 @@ impl Handler for Builder<'_> {
                 value_type,
                 class,
                 params,
-                space: TextureSpace {
-                    world_from_texture: self.state.now.transforms.start,
-                    origin: self.options.origin,
-                },
+                space: self.texture_space(),
             }),
-            D::Material(kind, params) => {
+            D::Attribute(group, params) => {
+                version4::attribute(group, params, &mut self.state, report);
+            }
+            D::ColorSpace(name) => {
+                self.state.now.color_space = version4::color_space(&name, report);
+                report.color_space = self.state.now.color_space;
+            }
+            D::Option(params) => version4::option(&params, report),
+            D::Material(kind, mut params) => {
+                self.define_normal_map(at, &mut params, report);
+                self.state.now.later_material = None;
                 let spec = material::declare(at, kind, params, &self.state, report);
                 self.state.now.material = Some(Arc::new(spec));
             }
-            D::MakeNamedMaterial(name, params) => {
+            D::MakeNamedMaterial(name, mut params) => {
+                self.define_normal_map(at, &mut params, report);
                 let spec = material::declare_named(at, &name, params, &self.state, report);
                 self.state.named_materials.define(name.text, Arc::new(spec));
             }

@@ -25,9 +25,13 @@ pub(crate) enum Directive {
     Accelerator(Quoted, Params),
     ActiveTransform(ActiveTransform),
     AreaLightSource(Quoted, Params),
+    /// Values of parameters that directives of a group do not give, of pbrt-v4.
+    Attribute(Quoted, Params),
     AttributeBegin,
     AttributeEnd,
     Camera(Quoted, Params),
+    /// Primaries of colours, of pbrt-v4.
+    ColorSpace(Quoted),
     ConcatTransform([f64; 16]),
     CoordSysTransform(Quoted),
     CoordinateSystem(Quoted),
@@ -47,6 +51,8 @@ pub(crate) enum Directive {
     ObjectBegin(Quoted),
     ObjectEnd,
     ObjectInstance(Quoted),
+    /// Options of the program, of pbrt-v4.
+    Option(Params),
     PixelFilter(Quoted, Params),
     ReverseOrientation,
     Rotate([f64; 4]),
@@ -76,6 +82,7 @@ impl Directive {
         match self {
             Self::Accelerator(_, params)
             | Self::AreaLightSource(_, params)
+            | Self::Attribute(_, params)
             | Self::Camera(_, params)
             | Self::Film(_, params)
             | Self::Integrator(_, params)
@@ -83,6 +90,7 @@ impl Directive {
             | Self::MakeNamedMaterial(_, params)
             | Self::MakeNamedMedium(_, params)
             | Self::Material(_, params)
+            | Self::Option(params)
             | Self::PixelFilter(_, params)
             | Self::Sampler(_, params)
             | Self::Shape(_, params)

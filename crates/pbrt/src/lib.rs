@@ -31,7 +31,8 @@
 //! - `state`, `builder`: the graphics state, and the scene under construction
 //! - `budget`, `parts`: limits on memory, and on nested textures and materials
 //! - `camera`, `film`, `settings`, `light`, `material`, `texture`, `shape`: one group of directives each
-//! - `material_key`: equality of materials
+//! - `material_key`: equality of materials;  `named_spectra`: metals, glasses and illuminants by name
+//! - `version4`: scenes of pbrt-v4
 //! - `transform`, `spectrum`: matrices and colours as pbrt-v3 defines them
 //! - `ply`, `mesh_file`: PLY meshes, and meshes that scenes name;  `bsdf_file`: tables of scattering
 #![forbid(unsafe_code)]
@@ -50,6 +51,7 @@ mod material;
 mod material_key;
 mod medium;
 mod mesh_file;
+mod named_spectra;
 mod names;
 mod number;
 mod params;
@@ -186,6 +188,7 @@ fn read(
     let mut builder = builder::Builder::new(options);
     if is_version4 {
         builder.set_version4();
+        report.is_version4 = true;
         // A name that is not translated mostly belongs to a feature that is missing.
         report.is_strict = true;
     }

@@ -1,13 +1,14 @@
 //! Directives for lights with and without a surface, with the parameters and defaults of pbrt-v3.
 
+use std::f32::consts::PI;
 use std::sync::Arc;
 
-use antumbra_scene::{AreaLight, Environment, Image, Light, Rgb, Sampler};
+use antumbra_scene::{AreaLight, Environment, EnvironmentMapping, Image, Light, Rgb, Sampler};
 use glam::{DMat3, DMat4, DVec3, DVec4, Mat3};
 
 use crate::directive::Quoted;
 use crate::lookup::Lookup;
-use crate::params::Params;
+use crate::params::{ParamType, Params};
 use crate::report::Report;
 use crate::source::Span;
 use crate::state::Transforms;
@@ -69,7 +70,19 @@ pub(crate) fn declare(
 
 /// Colour of the given name times the colour "scale".
 fn scaled(lookup: &mut Lookup, name: &'static str, report: &mut Report) -> Rgb {
-    lookup.color(name, Rgb::ONE, report) * lookup.color("scale", Rgb::ONE, report)
+    lookup.emission(name, Rgb::ONE, report) * lookup.color("scale", Rgb::ONE, report)
+}
+
+/// Factor that gives a light of pbrt-v4 the luminous power or illuminance of the parameter `name`, where it is given. The
+/// light has the value `own` without it.
+fn photometric(lookup: &mut Lookup, name: &'static str, own: f32, report: &mut Report) -> f32 {
+    if !report.is_version4 {
+        return 1.0;
+    }
+    match lookup.optional_float(name, report) {
+        Some(wanted) if wanted > 0.0 => wanted / own,
+        _ => 1.0,
+    }
 }
 
 /// Samples per shaded point: "samples", or "nsamples" by its older name.
@@ -80,8 +93,14 @@ fn samples(lookup: &mut Lookup, report: &mut Report) -> u32 {
 }
 
 fn point(lookup: &mut Lookup, to_world: &DMat4, report: &mut Report) -> Light {
-    let intensity = scaled(lookup, "I", report);
+    let intensity = scaled(lookup, "I", report) * photometric(lookup, "power", 4.0 * PI, report);
     let from = lookup.point("from", DVec3::ZERO, report);
+    if report.is_version4 {
+        return Light::Point {
+            position: transform::point(to_world, from).as_vec3(),
+            intensity,
+        };
+    }
     // pbrt-v3 adds "from" after the transformation, not before it.
     let position = transform::point(to_world, DVec3::ZERO) + from;
     Light::Point {
@@ -128,6 +147,13 @@ fn spot(lookup: &mut Lookup, to_world: &DMat4, report: &mut Report) -> Option<Li
         );
         return None;
     }
+    let own = PI * (2.0 - cos_falloff_start - cos_total_width);
+    let intensity = intensity * photometric(lookup, "power", own, report);
+    if report.is_version4 {
+        let message =
+            "the edge of a spot light falls off as in pbrt-v3, a little steeper than in pbrt-v4";
+        report.note(lookup.at, message);
+    }
     Some(Light::Spot {
         position: transform::point(to_world, from).as_vec3(),
         axis: axis.as_vec3(),
@@ -138,7 +164,7 @@ fn spot(lookup: &mut Lookup, to_world: &DMat4, report: &mut Report) -> Option<Li
 }
 
 fn distant(lookup: &mut Lookup, to_world: &DMat4, report: &mut Report) -> Option<Light> {
-    let radiance = scaled(lookup, "L", report);
+    let radiance = scaled(lookup, "L", report) * photometric(lookup, "illuminance", 1.0, report);
     let from = lookup.point("from", DVec3::ZERO, report);
     let to = lookup.point("to", DVec3::Z, report);
     let axis = direction(lookup, from, to, to_world, report)?;
@@ -154,6 +180,9 @@ fn infinite(
     images: &mut Images,
     report: &mut Report,
 ) -> Option<Light> {
+    if report.is_version4 {
+        return infinite4(lookup, to_world, images, report);
+    }
     let radiance = scaled(lookup, "L", report);
     let samples = samples(lookup, report);
     let environment = match map_name(lookup, images, report) {
@@ -161,6 +190,7 @@ fn infinite(
         Map::Broken => return None,
         Map::Image(image) => Some(Environment {
             image,
+            mapping: EnvironmentMapping::LongitudeLatitude,
             world_from_light: rotation(to_world, lookup, report)?,
         }),
     };
@@ -171,6 +201,52 @@ fn infinite(
     })
 }
 
+/// Infinite light of pbrt-v4: one colour, or an image on an octahedron.
+fn infinite4(
+    lookup: &mut Lookup,
+    to_world: &DMat4,
+    images: &mut Images,
+    report: &mut Report,
+) -> Option<Light> {
+    let radiance = scaled(lookup, "L", report);
+    let why = "it tells where the sky is seen from, and changes noise only";
+    lookup.left_out("portal", &[ParamType::Point3], why, report);
+    let light = |radiance, environment| {
+        Some(Light::Infinite {
+            radiance,
+            environment,
+            samples: 1,
+        })
+    };
+    if !lookup.has("filename") {
+        let factor = photometric(lookup, "illuminance", PI, report);
+        return light(radiance * factor, None);
+    }
+    for other in ["L", "illuminance"] {
+        if lookup.has(other) {
+            let feature = format!("{other:?} of an infinite light with an image is");
+            report.unsupported(lookup.at, feature);
+        }
+    }
+    let _ = lookup.find("illuminance", &[ParamType::Float]);
+    let image = images.of(lookup, "filename", report)?;
+    if image.width != image.height {
+        let (width, height) = (image.width, image.height);
+        report.error_help(
+            lookup.at,
+            format!("the image of an infinite light has {width} x {height} pixels"),
+            "in pbrt-v4 it is a square, an octahedron of equal areas",
+        );
+        return None;
+    }
+    let environment = Environment {
+        image,
+        mapping: EnvironmentMapping::EqualArea,
+        world_from_light: rotation(to_world, lookup, report)?,
+    };
+    light(radiance, Some(environment))
+}
+
 fn goniometric(
     lookup: &mut Lookup,
     to_world: &DMat4,
@@ -178,6 +254,12 @@ fn goniometric(
     report: &mut Report,
 ) -> Option<Light> {
     let intensity = scaled(lookup, "I", report);
+    if report.is_version4 && (lookup.has("filename") || lookup.has("power")) {
+        let feature = "a goniometric light of pbrt-v4 with an image or \"power\" is";
+        report.unsupported(lookup.at, feature);
+        lookup.ignore_all();
+        return None;
+    }
     let map = map_name(lookup, images, report);
     check_affine(lookup, to_world, report)?;
     Some(Light::Goniometric {
@@ -266,6 +348,12 @@ pub(crate) fn declare_area(
     let light = match kind.text.as_str() {
         "diffuse" | "area" => {
             let radiance = scaled(&mut lookup, "L", report);
+            for name in ["power", "filename"] {
+                if report.is_version4 && lookup.has(name) {
+                    let _ = lookup.find(name, &[ParamType::Float, ParamType::String]);
+                    report.unsupported(at, format!("{name:?} of an area light is"));
+                }
+            }
             Some(AreaLight {
                 radiance,
                 texture: None,

@@ -99,7 +99,7 @@ impl<'a> Lookup<'a> {
     /// Reports every parameter that was not used.
     pub fn finish(self, report: &mut Report) {
         for (param, used) in self.params.list.iter().zip(&self.used) {
-            if !used {
+            if !used && !param.is_attribute {
                 self.report_unused(param, report);
             }
         }
@@ -272,6 +272,14 @@ impl<'a> Lookup<'a> {
     pub fn color(&mut self, name: &'static str, default: Rgb, report: &mut Report) -> Rgb {
         match self.find(name, COLOR) {
             Some(param) => spectrum::read(param, report).unwrap_or(default),
+            None => default,
+        }
+    }
+
+    /// Emitted colour, or the default. In pbrt-v4, spectra and black bodies have luminance 1.
+    pub fn emission(&mut self, name: &'static str, default: Rgb, report: &mut Report) -> Rgb {
+        match self.find(name, COLOR) {
+            Some(param) => spectrum::read_emission(param, report).unwrap_or(default),
             None => default,
         }
     }

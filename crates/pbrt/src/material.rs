@@ -2,13 +2,15 @@
 //!
 //! - `hair`: hair
 //! - `subsurface`: bodies in which light is scattered
+//! - `version4`: materials of pbrt-v4
 
 pub(crate) mod hair;
 mod subsurface;
+pub(crate) mod version4;
 
 use std::sync::Arc;
 
-use antumbra_scene::{Material, Param, Rgb};
+use antumbra_scene::{Material, Param, Rgb, Texture};
 
 use crate::directive::Quoted;
 use crate::lookup::Lookup;
@@ -17,7 +19,7 @@ use crate::report::Report;
 use crate::source::Span;
 use crate::state::{MaterialSpec, State};
 use crate::texture::Textured;
-use crate::{parts, suggest};
+use crate::{named_spectra, parts, spectrum, suggest};
 
 /// Default material of pbrt.
 pub(crate) const DEFAULT: Material = Material::Matte {
@@ -223,26 +225,51 @@ fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report)
             None => DEFAULT,
         },
         "mix" => return mix(&mut values),
-        other => {
-            let mistake = format!("unknown material {other:?}");
-            let help = || suggest::help(other, SUPPORTED);
-            let report = &mut values.report;
-            report.tolerated(kind.span, mistake, "\"matte\" is taken", help);
-            let matte = Material::Matte {
-                kd: values.param("Kd", 0.5),
-                sigma: sigma(&mut values),
-            };
-            values.lookup.ignore_all();
-            matte
-        }
+        other => match version4::build(other, &mut values) {
+            Some(material) => material,
+            None => unknown(other, kind.span, &mut values),
+        },
     };
-    match values.find("bumpmap") {
-        // A constant height does not tilt normals.
-        None | Some((Param::Constant(_), _)) => material,
-        Some((height, _)) => Material::Bumped {
+    if let Some((height @ Param::Texture(_), _)) = values.find("bumpmap") {
+        return Material::Bumped {
             material: Arc::new(material),
             height,
+        };
+    }
+    // A constant height does not tilt normals.
+    match values.report.is_version4.then(|| values.find("normalmap")) {
+        Some(Some((normal, _))) => Material::NormalMapped {
+            material: Arc::new(material),
+            normal,
+            scale: 1.0,
         },
+        _ => material,
+    }
+}
+
+/// Matte in the place of an unknown material, as in pbrt-v3.
+fn unknown(other: &str, at: Span, values: &mut Textured) -> Material {
+    let mistake = format!("unknown material {other:?}");
+    let help = || {
+        let known = [SUPPORTED, version4::SUPPORTED].concat();
+        suggest::help(other, &known)
+    };
+    values
+        .report
+        .tolerated(at, mistake, "\"matte\" is taken", help);
+    let matte = Material::Matte {
+        kd: values.param("Kd", 0.5),
+        sigma: sigma(values),
+    };
+    values.lookup.ignore_all();
+    matte
+}
+
+/// Colour of a named spectrum of a surface. Black if there is none of that name.
+fn named_color(name: &str) -> Rgb {
+    match named_spectra::find(name) {
+        Some(named_spectra::Named::Samples(samples)) => spectrum::of_surface(samples).as_vec3(),
+        _ => Rgb::ZERO,
     }
 }
 
@@ -402,7 +429,7 @@ fn uber_roughness(values: &mut Textured) -> [Param<f32>; 2] {
 ///
 /// Mixtures of pbrt-v3 add the lobes of the second material to the tilted surface of the first.
 fn mix(values: &mut Textured) -> Material {
-    let amount = values.param("amount", 0.5);
+    let amount = amount(values);
     let [first, second] =
         ["namedmaterial1", "namedmaterial2"].map(|name| mixed_material(values, name));
     let (Some(first), Some(second)) = (first, second) else {
@@ -426,6 +453,20 @@ fn mix(values: &mut Textured) -> Material {
             height,
         },
         None => mixture,
+    }
+}
+
+/// Scale of the first material: a colour, or a number in pbrt-v4.
+fn amount(values: &mut Textured) -> Param<Rgb> {
+    if !values.report.is_version4 {
+        return values.param("amount", 0.5);
+    }
+    match values.param::<f32>("amount", 0.5) {
+        Param::Constant(amount) => Rgb::splat(amount).into(),
+        amount => Param::Texture(Arc::new(Texture::Mix {
+            ends: [Rgb::ZERO.into(), Rgb::ONE.into()],
+            amount,
+        })),
     }
 }
 

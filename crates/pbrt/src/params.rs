@@ -61,7 +61,7 @@ impl ParamType {
     /// Number of values per item of the type.
     fn group(self) -> usize {
         match self {
-            Self::Point2 | Self::Vector2 | Self::Blackbody => 2,
+            Self::Point2 | Self::Vector2 => 2,
             Self::Point3 | Self::Vector3 | Self::Normal | Self::Rgb | Self::Xyz => 3,
             _ => 1,
         }
@@ -107,6 +107,8 @@ pub(crate) struct Param {
     pub list: Span,
     /// Place of the first value, or of the bracket if the list is empty.
     pub value: Span,
+    /// Whether an `Attribute` gives the value. Directives without such a parameter leave the value out.
+    pub is_attribute: bool,
 }
 
 impl Param {
@@ -159,6 +161,7 @@ pub(crate) fn parse(lexer: &mut Lexer, report: &mut Report) -> Outcome {
                     values,
                     list,
                     value,
+                    is_attribute: false,
                 },
                 report,
             );
@@ -173,6 +176,20 @@ impl Params {
         for param in more.list {
             self.add(param, report);
         }
+    }
+
+    /// Adds the parameters of an `Attribute` of other names than those that are given.
+    pub fn fill(&mut self, attributes: &Self) {
+        let mut given: Vec<Param> = Vec::new();
+        for param in &attributes.list {
+            if self.list.iter().all(|own| own.name != param.name) {
+                given.push(Param {
+                    is_attribute: true,
+                    ..param.clone()
+                });
+            }
+        }
+        self.list.extend(given);
     }
 
     /// Adds a parameter. An earlier one with the same name and type is replaced, as in pbrt.

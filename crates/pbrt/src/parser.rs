@@ -36,11 +36,20 @@ pub(crate) fn parse(main_file: u32, handler: &mut impl Handler, report: &mut Rep
 struct Parser {
     /// Lexer of the file that is being read.
     current: Lexer,
-    /// Lexers of the files that include the current one, the main file first, each with the place of its `Include`.
-    includers: Vec<(Lexer, Span)>,
+    /// Files that include the current one, the main file first.
+    includers: Vec<Includer>,
     includes: usize,
     /// Bytes of files that were included more than once, but for the first time each.
     again: u64,
+}
+
+/// File that includes another one.
+struct Includer {
+    lexer: Lexer,
+    /// Place of the `Include`.
+    at: Span,
+    /// Place of the directive, if it is an `Import`.
+    import: Option<Span>,
 }
 
 /// Failure that was reported. The rest of the directive is to be skipped.
@@ -55,9 +64,13 @@ impl Parser {
             }
             let lexer = &mut self.current;
             let Some(token) = lexer.next(report) else {
-                match self.includers.pop() {
-                    Some((lexer, _)) => self.current = lexer,
-                    None => return self.current.end(),
+                let end = self.current.end();
+                let Some(Includer { lexer, import, .. }) = self.includers.pop() else {
+                    return end;
+                };
+                self.current = lexer;
+                if let Some(at) = import {
+                    handler.directive(at, Directive::AttributeEnd, report);
                 }
                 continue;
             };
@@ -70,9 +83,16 @@ impl Parser {
                 skip_past_arguments(lexer, report);
                 continue;
             };
-            if name == "Include" {
+            if name == "Include" || name == "Import" {
+                // In pbrt-v4, the state after an `Import` is the state before.
+                let import = (name == "Import").then_some(token.span);
                 match quoted(lexer, report, token) {
-                    Ok(path) => self.include(path, report),
+                    Ok(path) => {
+                        let is_open = self.include(path, import, report);
+                        if let Some(at) = import.filter(|_| is_open) {
+                            handler.directive(at, Directive::AttributeBegin, report);
+                        }
+                    }
                     Err(Failed) => skip_to_directive(lexer, report),
                 }
                 continue;
@@ -92,10 +112,11 @@ impl Parser {
     /// Adds the parameters after the `Include` of a file that ends with a directive: the list goes on there, as in pbrt-v3.
     fn take_parameters_of_includers(&mut self, params: &mut Params, report: &mut Report) {
         while self.current.peek(report).is_none() {
-            let Some((includer, _)) = self.includers.pop() else {
+            // The directive of an imported file ends with the file.
+            let Some(includer) = self.includers.pop_if(|file| file.import.is_none()) else {
                 return;
             };
-            self.current = includer;
+            self.current = includer.lexer;
             match params::parse(&mut self.current, report) {
                 Outcome::Complete(more) => params.extend(more, report),
                 Outcome::Failed => skip_to_directive(&mut self.current, report),
@@ -103,7 +124,8 @@ impl Parser {
         }
     }
 
-    fn include(&mut self, path: Quoted, report: &mut Report) {
+    /// Goes on in another file. False: a mistake was reported.
+    fn include(&mut self, path: Quoted, import: Option<Span>, report: &mut Report) -> bool {
         let full = report.sources.folder.join(&path.text);
         let (file, is_new) = match report.sources.open(&full) {
             Ok(opened) => opened,
@@ -114,7 +136,7 @@ impl Parser {
                     "allow more memory, or leave something out",
                 );
                 report.end();
-                return;
+                return false;
             }
             Err(error) => {
                 report.error_help(
@@ -122,10 +144,10 @@ impl Parser {
                     format!("cannot include {:?}: {error}", path.text),
                     "paths start at the folder of the main scene file",
                 );
-                return;
+                return false;
             }
         };
-        let mut open = self.includers.iter().map(|(lexer, _)| lexer.file());
+        let mut open = self.includers.iter().map(|includer| includer.lexer.file());
         if self.current.file() == file || open.any(|f| f == file) {
             let chain = self.chain(file, report);
             report.error_once(
@@ -133,7 +155,7 @@ impl Parser {
                 format!("{:?} includes itself: {chain}", path.text),
                 Some("remove this Include"),
             );
-            return;
+            return false;
         }
         if self.includers.len() == MAX_INCLUDE_DEPTH {
             let chain = self.chain(file, report);
@@ -142,13 +164,13 @@ impl Parser {
                 format!("files include each other more than {MAX_INCLUDE_DEPTH} deep: {chain}"),
                 None,
             );
-            return;
+            return false;
         }
         self.includes += 1;
         if self.includes > MAX_INCLUDES {
             let message = format!("more than {MAX_INCLUDES} files are included");
             report.error_once(path.span, message, None);
-            return;
+            return false;
         }
         if is_new {
             check_utf8(report, file);
@@ -163,11 +185,16 @@ impl Parser {
                     "define an object once, and place it with ObjectInstance",
                 );
                 report.end();
-                return;
+                return false;
             }
         }
         let includer = std::mem::replace(&mut self.current, Lexer::new(report, file));
-        self.includers.push((includer, path.span));
+        self.includers.push(Includer {
+            lexer: includer,
+            at: path.span,
+            import,
+        });
+        true
     }
 
     /// Chain of includes down to `last`, for messages. The middle of a long chain is omitted.
@@ -181,8 +208,12 @@ impl Parser {
                 .into_owned()
         };
         let mut links: Vec<String> = Vec::new();
-        for (lexer, include) in &self.includers {
-            links.push(format!("{}:{}", name(lexer.file()), include.line));
+        for includer in &self.includers {
+            links.push(format!(
+                "{}:{}",
+                name(includer.lexer.file()),
+                includer.at.line
+            ));
         }
         links.push(name(self.current.file()));
         links.push(name(last));
@@ -279,9 +310,11 @@ fn directive(
         "Accelerator" => with_params!(Accelerator),
         "ActiveTransform" => Directive::ActiveTransform(active_transform(lexer, report, at)?),
         "AreaLightSource" => with_params!(AreaLightSource),
+        "Attribute" => with_params!(Attribute),
         "AttributeBegin" => Directive::AttributeBegin,
         "AttributeEnd" => Directive::AttributeEnd,
         "Camera" => with_params!(Camera),
+        "ColorSpace" => Directive::ColorSpace(quoted(lexer, report, at)?),
         "ConcatTransform" => Directive::ConcatTransform(matrix(lexer, report, at)?),
         "CoordSysTransform" => Directive::CoordSysTransform(quoted(lexer, report, at)?),
         "CoordinateSystem" => Directive::CoordinateSystem(quoted(lexer, report, at)?),
@@ -306,6 +339,7 @@ fn directive(
         "ObjectBegin" => Directive::ObjectBegin(quoted(lexer, report, at)?),
         "ObjectEnd" => Directive::ObjectEnd,
         "ObjectInstance" => Directive::ObjectInstance(quoted(lexer, report, at)?),
+        "Option" => Directive::Option(params(lexer, report)?),
         "PixelFilter" => with_params!(PixelFilter),
         "ReverseOrientation" => Directive::ReverseOrientation,
         "Rotate" => Directive::Rotate(numbers(lexer, report, at)?),

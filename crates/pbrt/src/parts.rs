@@ -39,7 +39,7 @@ fn count_texture<T>(texture: &Texture<T>, left: &mut usize) -> bool {
         Texture::Mix { ends, amount } => {
             count_params(ends, left) && count_params(std::slice::from_ref(amount), left)
         }
-        Texture::AtLeast { value, .. } | Texture::Dither(value) => {
+        Texture::AtLeast { value, .. } | Texture::Root(value) | Texture::Dither(value) => {
             count_params(std::slice::from_ref(value), left)
         }
         Texture::Bilerp { .. }

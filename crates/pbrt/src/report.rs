@@ -2,6 +2,8 @@
 
 use std::collections::HashMap;
 
+use glam::DMat3;
+
 use crate::bsdf_file::Tables;
 use crate::diagnostic::{Diagnostic, Diagnostics, Severity};
 use crate::source::{Sources, Span};
@@ -24,6 +26,10 @@ pub(crate) struct Report {
     pub skips_unsupported: bool,
     /// See [`Options::strict`](crate::Options::strict).
     pub is_strict: bool,
+    /// Whether the scene is of pbrt-v4, whose parameters mean other things in places.
+    pub is_version4: bool,
+    /// Primaries of `rgb` parameters, where they are not those of the picture.
+    pub color_space: Option<DMat3>,
 }
 
 #[derive(Default)]

@@ -7,6 +7,7 @@
 use antumbra_scene::Rgb;
 use glam::{DVec3, Vec3};
 
+use crate::named_spectra::{self, Named};
 use crate::number::parse_float;
 use crate::params::{Param, ParamType, Values};
 use crate::report::Report;
@@ -16,11 +17,45 @@ use crate::source::read_regular_file;
 const FIRST_NM: u32 = 360;
 const LAST_NM: u32 = 830;
 
+/// What a spectrum is of.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Of {
+    /// A surface or an interface, in pbrt-v4 seen under daylight: an even spectrum is grey.
+    Surface,
+    /// A light. In pbrt-v4, spectra give colours of luminance 1.
+    Light,
+}
+
 /// Reads a colour parameter as linear RGB. `None`: a mistake was reported.
 pub(crate) fn read(param: &Param, report: &mut Report) -> Option<Rgb> {
+    read_as(param, Of::Surface, report)
+}
+
+/// Reads the colour of a light as linear RGB. `None`: a mistake was reported.
+pub(crate) fn read_emission(param: &Param, report: &mut Report) -> Option<Rgb> {
+    read_as(param, Of::Light, report)
+}
+
+fn read_as(param: &Param, of: Of, report: &mut Report) -> Option<Rgb> {
     let name = &param.name;
+    let color_of = |samples: Vec<[f64; 2]>| match of {
+        _ if !report.is_version4 => from_samples(samples),
+        Of::Surface => of_surface(samples),
+        Of::Light => at_luminance_1(from_samples(samples)),
+    };
     let color = match (&param.values, param.param_type) {
         (Values::Broken, _) => return None,
+        (Values::Strings(names), ParamType::Spectrum)
+            if report.is_version4
+                && let [name] = names.as_slice()
+                && let Some(named) = named_spectra::find(name) =>
+        {
+            match named {
+                Named::Samples(samples) => color_of(samples),
+                Named::Index(index) => DVec3::splat(index),
+                Named::Light(light) => light,
+            }
+        }
         (Values::Strings(files), _) => {
             let [file] = files.as_slice() else {
                 report.error(
@@ -30,7 +65,9 @@ pub(crate) fn read(param: &Param, report: &mut Report) -> Option<Rgb> {
                 return None;
             };
             match read_spd(file, report) {
-                Ok(samples) => from_samples(samples),
+                Ok(samples) if !report.is_version4 => from_samples(samples),
+                Ok(samples) if of == Of::Surface => of_surface(samples),
+                Ok(samples) => at_luminance_1(from_samples(samples)),
                 Err(message) => {
                     report.error_help(
                         param.value,
@@ -47,11 +84,14 @@ pub(crate) fn read(param: &Param, report: &mut Report) -> Option<Rgb> {
         }
         (Values::Floats(values), ParamType::Spectrum) if !values.is_empty() => {
             let pairs = values.chunks_exact(2);
-            from_samples(pairs.map(|p| [f64::from(p[0]), f64::from(p[1])]).collect())
+            color_of(pairs.map(|p| [f64::from(p[0]), f64::from(p[1])]).collect())
         }
         (Values::Floats(values), ParamType::Blackbody) => match values[..] {
+            [kelvin] if kelvin > 0.0 && report.is_version4 => {
+                at_luminance_1(from_black_body(kelvin.into()))
+            }
             [kelvin, scale] if kelvin > 0.0 => from_black_body(kelvin.into()) * f64::from(scale),
-            [kelvin, _] => {
+            [kelvin] | [kelvin, _] if !(kelvin > 0.0) => {
                 report.error(
                     param.value,
                     format!("temperature {kelvin} of {name:?} must be positive"),
@@ -62,7 +102,10 @@ pub(crate) fn read(param: &Param, report: &mut Report) -> Option<Rgb> {
         },
         (Values::Floats(values), kind @ (ParamType::Rgb | ParamType::Xyz)) => match values[..] {
             [x, y, z] if kind == ParamType::Xyz => rgb_from_xyz(Vec3::new(x, y, z).as_dvec3()),
-            [r, g, b] if r >= 0.0 && g >= 0.0 && b >= 0.0 => return Some(Rgb::new(r, g, b)),
+            [r, g, b] if r >= 0.0 && g >= 0.0 && b >= 0.0 => match report.color_space {
+                None => return Some(Rgb::new(r, g, b)),
+                Some(space) => space * Vec3::new(r, g, b).as_dvec3(),
+            },
             [r, g, b] => {
                 report.error(
                     param.list,
@@ -142,9 +185,14 @@ fn rgb_from_spectrum(value_at: impl Fn(f64) -> f64) -> DVec3 {
 /// Linear RGB of a spectrum given as `[wavelength, value]` pairs in any order.
 ///
 /// Values are interpolated linearly between the wavelengths, and constant outside.
-fn from_samples(mut samples: Vec<[f64; 2]>) -> DVec3 {
+fn from_samples(samples: Vec<[f64; 2]>) -> DVec3 {
+    rgb_from_spectrum(interpolated(samples))
+}
+
+/// Value by wavelength, see [`from_samples`].
+pub(crate) fn interpolated(mut samples: Vec<[f64; 2]>) -> impl Fn(f64) -> f64 {
     samples.sort_by(|a, b| a[0].total_cmp(&b[0]));
-    let value_at = |nm: f64| {
+    move |nm: f64| {
         let after = samples.partition_point(|[wavelength, _]| *wavelength <= nm);
         match (after.checked_sub(1).map(|i| samples[i]), samples.get(after)) {
             (Some([w0, v0]), Some([w1, v1])) => v0 + (v1 - v0) * (nm - w0) / (w1 - w0),
@@ -152,8 +200,31 @@ fn from_samples(mut samples: Vec<[f64; 2]>) -> DVec3 {
             (None, Some([_, value])) => *value,
             (None, None) => 0.0,
         }
+    }
+}
+
+/// Linear RGB of a surface with this spectrum under daylight (CIE D65), where an even spectrum of value 1 is white.
+pub(crate) fn of_surface(samples: Vec<[f64; 2]>) -> DVec3 {
+    let value_at = interpolated(samples);
+    let under = |value_at: &dyn Fn(f64) -> f64| {
+        rgb_from_spectrum(|nm| value_at(nm) * named_spectra::daylight(nm))
     };
-    rgb_from_spectrum(value_at)
+    under(&value_at) / under(&|_| 1.0)
+}
+
+/// Colour with luminance 1. Black stays black.
+fn at_luminance_1(color: DVec3) -> DVec3 {
+    let luminance = color.dot(DVec3::new(0.212671, 0.715160, 0.072169));
+    if luminance > 0.0 {
+        color / luminance
+    } else {
+        color
+    }
+}
+
+/// Linear RGB of a chromaticity with luminance 1.
+pub(crate) fn from_chromaticity([x, y]: [f64; 2]) -> DVec3 {
+    rgb_from_xyz(DVec3::new(x / y, 1.0, (1.0 - x - y) / y))
 }
 
 /// Linear RGB of a black body: Planck's law divided by its maximum, as in pbrt-v3.

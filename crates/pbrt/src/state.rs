@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use antumbra_scene::{AreaLight, Material, Param, Rgb};
-use glam::DMat4;
+use glam::{DMat3, DMat4};
 
 use crate::directive::{ActiveTransform, Quoted};
 use crate::params::Params;
@@ -75,10 +75,16 @@ pub(crate) struct Attributes {
     pub transforms: Transforms,
     /// Current material; `None` means the default, matte.
     pub material: Option<Arc<MaterialSpec>>,
+    /// Name of the current material, if pbrt-v4 defines it after its use.
+    pub later_material: Option<Arc<Quoted>>,
     pub area_light: Option<AreaLight>,
     /// Names of the media inside and outside of surfaces, of which an empty one is vacuum.
     pub media: [Option<Arc<Quoted>>; 2],
     pub reverse_orientation: bool,
+    /// Values of parameters that directives of a group do not give, the newest last.
+    pub attributes: Vec<(String, Arc<Params>)>,
+    /// Primaries of colours, where they are not those of the picture.
+    pub color_space: Option<DMat3>,
     /// Place of the `ObjectBegin` of the open object.
     pub object: Option<Span>,
 }
@@ -167,6 +173,8 @@ pub(crate) struct State {
     pub named_materials: Scoped<Arc<MaterialSpec>>,
     pub float_textures: Scoped<Definition<f32>>,
     pub color_textures: Scoped<Definition<Rgb>>,
+    /// Whether names outlive the blocks that define them, as in pbrt-v4.
+    pub names_stay: bool,
     blocks: Vec<Block>,
 }
 
@@ -203,6 +211,9 @@ impl State {
             return;
         }
         self.now = block.saved;
+        if self.names_stay {
+            return;
+        }
         let [materials, floats, colors] = block.marks;
         self.named_materials.rewind(materials);
         self.float_textures.rewind(floats);

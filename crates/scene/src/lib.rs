@@ -52,7 +52,7 @@ pub use film::{Film, Filter};
 pub use flatten::{Error, MAX_FLAT_TRIANGLES};
 pub use fourier::FourierTable;
 pub use instance::{Instance, Object};
-pub use light::{Environment, Light};
+pub use light::{Environment, EnvironmentMapping, Light};
 pub use material::{Interior, Material, MaterialPart, Pigment};
 pub use medium::{DensityGrid, Medium, MediumInterface};
 pub use settings::{Accelerator, DirectStrategy, Integrator, LightStrategy, Sampler, SamplerKind};

@@ -43,7 +43,7 @@ pub enum Light {
         world_from_light: Mat4,
         /// Scale of the radiant intensity.
         intensity: Rgb,
-        /// Intensity by direction, as in [`Environment::image`] but with y up: pbrt-v3 swaps y and z here.
+        /// Intensity by direction, by longitude and latitude, but with y up: pbrt-v3 swaps y and z here.
         ///
         /// `None` means equal intensity in every direction.
         image: Option<Arc<Image>>,
@@ -73,9 +73,21 @@ pub enum Light {
 /// Radiance by direction, as an image.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Environment {
-    /// Image by longitude and latitude. Columns begin at the x axis of light space and turn towards y. Row 0 is the
-    /// direction of the z axis.
+    /// Radiance by direction, in the layout of `mapping`.
     pub image: Arc<Image>,
+    /// How directions are laid out in the image.
+    pub mapping: EnvironmentMapping,
     /// Light space to world space: a rotation, perhaps with a reflection.
     pub world_from_light: Mat3,
+}
+
+/// Layout of the directions of a sphere in an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub enum EnvironmentMapping {
+    /// Longitude and latitude. Columns begin at the x axis of light space and turn towards y. Row 0 is the direction of the
+    /// z axis. Texels are interpolated.
+    LongitudeLatitude,
+    /// Octahedron of equal areas (Clarberg 2008): the middle of the square is the z axis of light space, its corners are the
+    /// opposite direction, columns go along x and rows along y. A texel has one colour.
+    EqualArea,
 }

@@ -108,6 +108,35 @@ pub enum Material {
         /// Share of the base that is a thin transparent sheet, 0..=1. Light goes straight through.
         transmission: Param<f32>,
     },
+    /// Diffuse base under a dielectric coat, with the light that coat and base reflect to each other.
+    ///
+    /// White bases lose no light. Coloured ones are more saturated than under [`Self::Substrate`].
+    CoatedDiffuse {
+        /// Reflectance of the base without the coat, clamped to 0..=1.
+        reflectance: Param<Rgb>,
+        /// Index of refraction of the coat, at least 1. Values below 1 count as their reciprocals.
+        eta: Param<f32>,
+        /// Microfacet alpha of the coat, 0..=1.
+        roughness: Param<f32>,
+    },
+    /// Conductor under a dielectric coat, with the light that goes to and fro between them.
+    CoatedConductor {
+        /// Index of refraction of the conductor.
+        eta: Param<Rgb>,
+        /// Absorption coefficient of the conductor.
+        k: Param<Rgb>,
+        /// Microfacet alpha of the conductor along u and v.
+        roughness: [Param<f32>; 2],
+        /// Index of refraction of the coat.
+        coat_eta: Param<f32>,
+        /// Microfacet alpha of the coat along u and v.
+        coat_roughness: [Param<f32>; 2],
+    },
+    /// Smooth thin pane of a dielectric: light is reflected, or goes straight on. Both count light between the two sides.
+    ThinDielectric {
+        /// Index of refraction of the pane over that around it.
+        eta: Param<f32>,
+    },
     /// Thin sheet: diffuse and glossy light on both sides.
     Translucent {
         /// Scale of the diffuse light.
@@ -339,6 +368,22 @@ impl Material {
                 };
                 [&inside[..], &[eta, m, n, tilt].map(Number)].concat()
             }
+            Self::CoatedDiffuse {
+                reflectance,
+                eta,
+                roughness,
+            } => vec![Color(reflectance), Number(eta), Number(roughness)],
+            Self::CoatedConductor {
+                eta,
+                k,
+                roughness: [u, v],
+                coat_eta,
+                coat_roughness: [coat_u, coat_v],
+            } => {
+                let numbers = [u, v, coat_eta, coat_u, coat_v].map(Number);
+                [&[Color(eta), Color(k)], &numbers[..]].concat()
+            }
+            Self::ThinDielectric { eta } => vec![Number(eta)],
             Self::Fourier(table) => vec![Table(table)],
             Self::Mix {
                 materials: [a, b],

@@ -98,6 +98,8 @@ pub enum Texture<T> {
         /// Smallest value that counts as 1.
         least: f32,
     },
+    /// Square root of the value; 0 where the value is negative.
+    Root(Param<f32>),
     /// 1 with the value as its probability, and 0 elsewhere. The decision depends on the bits of the position alone.
     ///
     /// As an alpha mask, the texture makes a surface as transparent as 1 minus the value, for all rays alike.

@@ -1,6 +1,8 @@
 //! Triangle meshes, given in the scene or in a separate file.
 
-use antumbra_scene::{Param as TexturedParam, TriangleMesh};
+use std::sync::Arc;
+
+use antumbra_scene::{Param as TexturedParam, Texture, TriangleMesh};
 use glam::{DMat4, DVec3, Vec2};
 
 use crate::lookup::Lookup;
@@ -37,9 +39,13 @@ pub(super) fn cutouts(values: &mut Textured) -> Cutouts {
     cutouts
 }
 
-/// Reads an alpha mask. Only 0 cuts out, so other constants mean no mask.
+/// Reads an alpha mask. Only 0 cuts out, so other constants mean no mask. In pbrt-v4, a value is a probability.
 fn cutout(values: &mut Textured, name: &'static str) -> Option<TexturedParam<f32>> {
     match values.find(name)?.0 {
+        TexturedParam::Constant(value) if values.report.is_version4 && value >= 1.0 => None,
+        alpha if values.report.is_version4 && alpha.constant().is_none_or(|&alpha| alpha > 0.0) => {
+            Some(TexturedParam::Texture(Arc::new(Texture::Dither(alpha))))
+        }
         TexturedParam::Constant(value) if value != 0.0 => None,
         alpha => Some(alpha),
     }
@@ -92,7 +98,7 @@ pub(super) fn triangle_mesh(
         return None;
     };
     let count = point_values.len() / 3;
-    check_indices(indices, index_values, count, report);
+    check_indices(indices, index_values, (3, "triangles"), count, report);
     for (param, components) in [(normals, 3), (tangents, 3), (uvs, 2)] {
         if let Some(param) = param {
             check_count(param, components, count, report);
@@ -158,7 +164,9 @@ pub(super) fn subdivided(
     else {
         return None;
     };
-    check_indices(indices?, index_values, point_values.len() / 3, report);
+    let of_triangles = (3, "triangles");
+    let count = point_values.len() / 3;
+    check_indices(indices?, index_values, of_triangles, count, report);
     let bytes = (index_values.len() as u64 / 3)
         .checked_mul(1 << (2 * levels))
         .and_then(|triangles| triangles.checked_mul(BYTES_PER_TRIANGLE));
@@ -215,11 +223,19 @@ fn triples(values: &[f32]) -> impl Iterator<Item = [f32; 3]> + '_ {
 }
 
 /// Reports the first index that is out of range, and the number of further ones.
-fn check_indices(param: &Param, indices: &[i32], count: usize, report: &mut Report) {
-    if indices.is_empty() || !indices.len().is_multiple_of(3) {
+///
+/// `group` indices make one of `what`.
+pub(super) fn check_indices(
+    param: &Param,
+    indices: &[i32],
+    (group, what): (usize, &str),
+    count: usize,
+    report: &mut Report,
+) {
+    if indices.is_empty() || !indices.len().is_multiple_of(group) {
         report.error(
             param.list,
-            format!("{} indices do not make triangles", indices.len()),
+            format!("{} indices do not make {what}", indices.len()),
         );
     }
     let is_wrong = |index: &i32| usize::try_from(*index).map_or(true, |i| i >= count);
@@ -246,7 +262,7 @@ fn check_indices(param: &Param, indices: &[i32], count: usize, report: &mut Repo
 }
 
 /// Checks that there is one value per vertex. More texture coordinates are accepted, as in pbrt.
-fn check_count(param: &Param, components: usize, vertices: usize, report: &mut Report) {
+pub(super) fn check_count(param: &Param, components: usize, vertices: usize, report: &mut Report) {
     if param.values == Values::Broken {
         return;
     }

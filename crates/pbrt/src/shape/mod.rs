@@ -1,9 +1,10 @@
 //! Directives for shapes: geometry in world space, or in the space of its object.
 //!
 //! - `mesh`: triangle meshes and their alpha masks;  `subdivision`: meshes that are made smooth
-//! - `sphere`: spheres
+//! - `bilinear`: patches of pbrt-v4;  `sphere`: spheres
 //! - `quadric`, `curve`: smooth surfaces, tessellated to meshes by `grid`
 
+mod bilinear;
 mod curve;
 mod grid;
 mod mesh;
@@ -35,6 +36,9 @@ pub(crate) const SUPPORTED: &[&str] = &[
     "trianglemesh",
 ];
 
+/// Shapes of pbrt-v4 that version 3 does not have.
+pub(crate) const SUPPORTED4: &[&str] = &["bilinearmesh"];
+
 /// Shapes of pbrt-v3 that are not supported.
 pub(crate) const UNSUPPORTED: &[&str] =
     &["cone", "heightfield", "hyperboloid", "nurbs", "paraboloid"];
@@ -58,6 +62,10 @@ pub(crate) fn read(
     let now = &values.state.now;
     let is_emitter = now.area_light.is_some() && now.object.is_none();
     let tessellation = Tessellation::of(is_emitter);
+    let known = match values.report.is_version4 {
+        true => [SUPPORTED, SUPPORTED4].concat(),
+        false => SUPPORTED.to_vec(),
+    };
     match kind.text.as_str() {
         "trianglemesh" => {
             let cutouts = mesh::cutouts(values);
@@ -73,6 +81,12 @@ pub(crate) fn read(
             let cutouts = mesh::cutouts(values);
             let file = mesh::ply_mesh(values.lookup, (to_world, middle), values.report)?;
             Some((Source::File(file), cutouts))
+        }
+        "bilinearmesh" if values.report.is_version4 => {
+            let cutouts = mesh::cutouts(values);
+            let mesh = bilinear::bilinear_mesh(values.lookup, middle, values.report)?;
+            let to_world = to_world * DMat4::from_translation(middle);
+            Some((moved(mesh, &to_world), cutouts))
         }
         "curve" => {
             let mesh = curve::curve(values.lookup, values.report)?;
@@ -98,10 +112,10 @@ pub(crate) fn read(
             values.lookup.ignore_all();
             if UNSUPPORTED.contains(&name) {
                 let report = &mut values.report;
-                report.unsupported_kind(kind.span, "shape", name, SUPPORTED);
+                report.unsupported_kind(kind.span, "shape", name, &known);
             } else {
                 let message = format!("unknown shape {name:?}");
-                let help = suggest::help(name, SUPPORTED);
+                let help = suggest::help(name, &known);
                 values.report.error_help(kind.span, message, help);
             }
             None

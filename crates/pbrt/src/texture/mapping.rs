@@ -1,7 +1,7 @@
 //! Mappings from points of surfaces to texture coordinates.
 
 use antumbra_scene::Mapping;
-use glam::{DVec3, Vec2};
+use glam::{DMat3, DVec3, Vec2};
 
 use super::TextureSpace;
 use crate::lookup::Lookup;
@@ -36,7 +36,18 @@ pub(super) fn read(
                 lookup.vector("v1", DVec3::X, report),
                 lookup.vector("v2", DVec3::Y, report),
             ];
-            let [s, t] = axes.map(|axis| axis.dot(space.origin) as f32);
+            let (axes, from) = match report.is_version4 {
+                // pbrt-v4 measures in the space of the texture, pbrt-v3 in the world.
+                true => {
+                    let matrix = space.world_from_texture.inverse();
+                    let linear = DMat3::from_mat4(matrix).transpose();
+                    let moved = matrix.w_axis.truncate();
+                    let from = axes.map(|axis| axis.dot(moved));
+                    (axes.map(|axis| linear * axis), from)
+                }
+                false => (axes, [0.0; 2]),
+            };
+            let [s, t] = [0, 1].map(|k| (axes[k].dot(space.origin) + from[k]) as f32);
             Some(Mapping::Planar {
                 axes: axes.map(|axis| axis.as_vec3()),
                 offset: offset(lookup, report) + Vec2::new(s, t),

@@ -67,6 +67,8 @@ pub(crate) trait Value:
     fn read(param: &params::Param, report: &mut Report) -> Option<Self>;
     fn textures(state: &State) -> &Scoped<Definition<Self>>;
     fn textures_mut(state: &mut State) -> &mut Scoped<Definition<Self>>;
+    /// 1 minus a texture. `None` for colours.
+    fn inverted(texture: Texture<Self>) -> Option<Texture<Self>>;
 }
 
 impl Value for f32 {
@@ -88,6 +90,13 @@ impl Value for f32 {
 
     fn textures_mut(state: &mut State) -> &mut Scoped<Definition<Self>> {
         &mut state.float_textures
+    }
+
+    fn inverted(texture: Texture<Self>) -> Option<Texture<Self>> {
+        Some(Texture::Mix {
+            ends: [1.0.into(), 0.0.into()],
+            amount: Param::Texture(Arc::new(texture)),
+        })
     }
 }
 
@@ -116,6 +125,10 @@ impl Value for Rgb {
 
     fn textures_mut(state: &mut State) -> &mut Scoped<Definition<Self>> {
         &mut state.color_textures
+    }
+
+    fn inverted(_: Texture<Self>) -> Option<Texture<Self>> {
+        None
     }
 }
 
@@ -200,6 +213,15 @@ impl TextureSpace {
     fn world_from_scene(&self) -> DMat4 {
         DMat4::from_translation(self.origin)
     }
+
+    /// From the scene to the space of noise and cubes. pbrt-v3 does not invert the transformation.
+    fn of_noise(&self, report: &Report) -> DMat4 {
+        let matrix = match report.is_version4 {
+            true => self.world_from_texture.inverse(),
+            false => self.world_from_texture,
+        };
+        matrix * self.world_from_scene()
+    }
 }
 
 impl Declaration {
@@ -273,6 +295,10 @@ fn build<T: Value>(
             Some(Texture::Mix { ends, amount })
         }
         "checkerboard" => checkerboard(values, space),
+        "directionmix" if values.report.is_version4 => {
+            values.lookup.ignore_all();
+            return Definition::Unsupported("directionmix".into());
+        }
         "bilerp" => {
             let corners = [("v00", 0.0), ("v01", 1.0), ("v10", 0.0), ("v11", 1.0)];
             let corners = corners.map(|(name, default)| values.constant(name, default));
@@ -285,9 +311,15 @@ fn build<T: Value>(
             let mapping = mapping::read(values.lookup, space, values.report);
             mapping.map(|mapping| Texture::Dots { dots, mapping })
         }
-        "fbm" => Some(noise(NoisePattern::Fbm(octaves(values)), space)),
-        "wrinkled" => Some(noise(NoisePattern::Wrinkled(octaves(values)), space)),
-        "windy" => Some(noise(NoisePattern::Windy, space)),
+        "fbm" => {
+            let pattern = NoisePattern::Fbm(octaves(values));
+            Some(noise(pattern, space, values.report))
+        }
+        "wrinkled" => {
+            let pattern = NoisePattern::Wrinkled(octaves(values));
+            Some(noise(pattern, space, values.report))
+        }
+        "windy" => Some(noise(NoisePattern::Windy, space, values.report)),
         // pbrt-v3 has none of numbers, and says so where one is used.
         name @ ("marble" | "uv") if T::NAME == f32::NAME => {
             values.lookup.ignore_all();
@@ -299,10 +331,22 @@ fn build<T: Value>(
                 scale: values.constant("scale", 1.0),
                 variation: values.constant("variation", 0.2),
             };
-            Some(noise(pattern, space))
+            Some(noise(pattern, space, values.report))
         }
         "uv" => mapping::read(values.lookup, space, values.report).map(Texture::Uv),
-        "imagemap" => image_map(values, space, images).map(Texture::Image),
+        "imagemap" => {
+            let texture = image_map(values, space, images).map(Texture::Image);
+            let Textured { lookup, report, .. } = values;
+            if report.is_version4 && lookup.bool("invert", false, report) {
+                let inverted = texture.map(T::inverted);
+                if inverted.as_ref().is_some_and(Option::is_none) {
+                    report.unsupported(lookup.at, "\"invert\" of an image of colours is");
+                }
+                inverted.flatten()
+            } else {
+                texture
+            }
+        }
         name => {
             values.lookup.ignore_all();
             if UNSUPPORTED.contains(&name) {
@@ -335,8 +379,7 @@ fn checkerboard<T: Value>(values: &mut Textured, space: &TextureSpace) -> Option
     if dimension == 3 {
         return Some(Texture::Checkerboard3 {
             cubes: squares,
-            // pbrt-v3 does not invert the transformation here.
-            texture_from_world: space.world_from_texture * space.world_from_scene(),
+            texture_from_world: space.of_noise(report),
         });
     }
     if dimension > 3 {
@@ -354,11 +397,10 @@ fn checkerboard<T: Value>(values: &mut Textured, space: &TextureSpace) -> Option
     })
 }
 
-fn noise<T>(pattern: NoisePattern, space: &TextureSpace) -> Texture<T> {
+fn noise<T>(pattern: NoisePattern, space: &TextureSpace, report: &Report) -> Texture<T> {
     Texture::Noise {
         pattern,
-        // pbrt-v3 does not invert the transformation here.
-        texture_from_world: space.world_from_texture * space.world_from_scene(),
+        texture_from_world: space.of_noise(report),
     }
 }
 

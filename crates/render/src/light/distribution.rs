@@ -15,7 +15,7 @@ use super::image::{texel, texel_solid_angle};
 use crate::color::luminance;
 
 /// Largest number of cells, so that their table takes at most 16 MiB.
-const MOST: usize = 1 << 22;
+pub(super) const MOST: usize = 1 << 22;
 
 /// Probabilities of the cells of a sphere.
 #[derive(Clone, Debug)]
@@ -182,7 +182,7 @@ fn integrate(image: &Image, scale: Vec3, texels: std::ops::Range<usize>, edge: u
 }
 
 /// Fills `cumulative` with cumulative weights over their sum, and returns the sum. Uniform if the sum is 0.
-fn cumulate(weights: &[f64], cumulative: &mut [f32]) -> f64 {
+pub(super) fn cumulate(weights: &[f64], cumulative: &mut [f32]) -> f64 {
     let total: f64 = weights.iter().sum();
     let mut sum = 0.0;
     let count = weights.len() as f64;
@@ -199,7 +199,7 @@ fn cumulate(weights: &[f64], cumulative: &mut [f32]) -> f64 {
 
 /// Entry whose share of the cumulative probabilities holds `u`, its probability, and the place of `u` in the share.
 #[inline]
-fn invert(cumulative: &[f32], u: f32) -> (usize, f32, f32) {
+pub(super) fn invert(cumulative: &[f32], u: f32) -> (usize, f32, f32) {
     let last = cumulative.len() - 1;
     let index = cumulative.partition_point(|&sum| sum <= u).min(last);
     let (start, probability) = share(cumulative, index);
@@ -210,7 +210,7 @@ fn invert(cumulative: &[f32], u: f32) -> (usize, f32, f32) {
 
 /// Start of the share of an entry, and its probability.
 #[inline]
-fn share(cumulative: &[f32], index: usize) -> (f32, f32) {
+pub(super) fn share(cumulative: &[f32], index: usize) -> (f32, f32) {
     let start = if index == 0 {
         0.0
     } else {

@@ -2,11 +2,12 @@
 
 use std::sync::Arc;
 
-use antumbra_scene::Image;
+use antumbra_scene::{EnvironmentMapping, Image};
 use glam::{Mat3, Vec3};
 
 use super::distribution::SphereDistribution;
 use super::image::{longitude_latitude, lookup};
+use super::octahedron::{self, SquareDistribution};
 use super::{LightSample, Receiver};
 
 /// Radiance by direction.
@@ -16,9 +17,16 @@ pub struct Environment {
     scale: Vec3,
     world_from_light: Mat3,
     light_from_world: Mat3,
-    distribution: SphereDistribution,
+    distribution: Distribution,
     /// Samples per point. 0 counts as 1.
     pub samples: u32,
+}
+
+/// Probabilities of directions, by the layout of the image.
+#[derive(Clone, Debug)]
+enum Distribution {
+    Sphere(SphereDistribution),
+    Square(SquareDistribution),
 }
 
 impl Environment {
@@ -30,7 +38,14 @@ impl Environment {
             world_from_light: environment.world_from_light,
             // The inverse of a rotation.
             light_from_world: environment.world_from_light.transpose(),
-            distribution: SphereDistribution::new(&environment.image, scale),
+            distribution: match environment.mapping {
+                EnvironmentMapping::LongitudeLatitude => {
+                    Distribution::Sphere(SphereDistribution::new(&environment.image, scale))
+                }
+                EnvironmentMapping::EqualArea => {
+                    Distribution::Square(SquareDistribution::new(&environment.image, scale))
+                }
+            },
             samples,
         }
     }
@@ -38,20 +53,27 @@ impl Environment {
     /// Radiance along a ray in direction `dir`.
     #[inline]
     pub fn radiance(&self, dir: Vec3) -> Vec3 {
-        self.lookup(longitude_latitude(self.light_from_world * dir))
+        self.lookup(self.place(dir))
     }
 
     /// Radiance along a ray in direction `dir`, and density of that direction in [`Self::sample`].
     #[inline]
     pub fn radiance_and_pdf(&self, dir: Vec3) -> (Vec3, f32) {
-        let place = longitude_latitude(self.light_from_world * dir);
-        (self.lookup(place), self.distribution.pdf(place))
+        let place = self.place(dir);
+        let pdf = match &self.distribution {
+            Distribution::Sphere(sphere) => sphere.pdf(place),
+            Distribution::Square(square) => square.pdf(place),
+        };
+        (self.lookup(place), pdf)
     }
 
     /// Sample of a bright direction. `None` on the far side of a receiver with one side, and if all is dark.
     #[inline]
     pub fn sample(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
-        let choice = self.distribution.sample(u);
+        let choice = match &self.distribution {
+            Distribution::Sphere(sphere) => sphere.sample(u),
+            Distribution::Square(square) => square.sample(u),
+        };
         let wi = (self.world_from_light * choice.direction).try_normalize()?;
         if !at.both_sides && wi.dot(at.normal) <= 0.0 {
             return None;
@@ -61,11 +83,28 @@ impl Environment {
 
     /// Luminance of the mean over all directions.
     pub fn mean_luminance(&self) -> f32 {
-        self.distribution.mean()
+        match &self.distribution {
+            Distribution::Sphere(sphere) => sphere.mean(),
+            Distribution::Square(square) => square.mean(),
+        }
+    }
+
+    /// Place of a direction in the image.
+    #[inline]
+    fn place(&self, dir: Vec3) -> [f32; 2] {
+        let local = self.light_from_world * dir;
+        match self.distribution {
+            Distribution::Sphere(_) => longitude_latitude(local),
+            Distribution::Square(_) => octahedron::place(local),
+        }
     }
 
     #[inline]
     fn lookup(&self, place: [f32; 2]) -> Vec3 {
-        self.scale * lookup(&self.image, place)
+        let color = match self.distribution {
+            Distribution::Sphere(_) => lookup(&self.image, place),
+            Distribution::Square(_) => octahedron::lookup(&self.image, place),
+        };
+        self.scale * color
     }
 }

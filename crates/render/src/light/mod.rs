@@ -4,7 +4,7 @@
 //! - `choice/`: all lights of a scene, and the choice of one of them
 //! - `point.rs`: lights at a point, with the profiles `spot.rs`, `goniometric.rs`, `projection.rs`
 //! - `sky.rs`: uniform radiance from outside the scene
-//! - `environment.rs`: radiance from outside by an image, sampled by `distribution.rs`
+//! - `environment.rs`: radiance from outside by an image, sampled by `distribution.rs` or `octahedron.rs`
 //! - `emitter.rs`, `sphere.rs`: emitting shapes
 //! - `emitter_tree.rs`: a tree of the emitting shapes alone
 //! - `image.rs`: images as lights read them
@@ -17,6 +17,7 @@ mod emitter_tree;
 mod environment;
 mod goniometric;
 mod image;
+mod octahedron;
 mod point;
 mod projection;
 mod sky;

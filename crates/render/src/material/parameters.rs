@@ -68,6 +68,21 @@ pub enum Parameters {
         coat: Input<Rgb>,
         transparent: Input<f32>,
     },
+    CoatedDiffuse {
+        reflectance: Input<Rgb>,
+        eta: Input<f32>,
+        roughness: Input<f32>,
+    },
+    CoatedConductor {
+        eta: Input<Rgb>,
+        k: Input<Rgb>,
+        roughness: Roughness,
+        coat_eta: Input<f32>,
+        coat_roughness: Roughness,
+    },
+    ThinDielectric {
+        eta: Input<f32>,
+    },
     Subsurface {
         kr: Input<Rgb>,
         kt: Input<Rgb>,
@@ -248,6 +263,31 @@ impl Lowering<'_> {
                 reflect: self.input(reflect),
                 transmit: self.input(transmit),
                 roughness: self.roughness([roughness; 2], *remap_roughness),
+            },
+            Scene::CoatedDiffuse {
+                reflectance,
+                eta,
+                roughness,
+            } => Parameters::CoatedDiffuse {
+                reflectance: self.input(reflectance),
+                eta: self.input(eta),
+                roughness: self.input(roughness),
+            },
+            Scene::CoatedConductor {
+                eta,
+                k,
+                roughness,
+                coat_eta,
+                coat_roughness,
+            } => Parameters::CoatedConductor {
+                eta: self.input(eta),
+                k: self.input(k),
+                roughness: self.roughness(roughness.each_ref(), false),
+                coat_eta: self.input(coat_eta),
+                coat_roughness: self.roughness(coat_roughness.each_ref(), false),
+            },
+            Scene::ThinDielectric { eta } => Parameters::ThinDielectric {
+                eta: self.input(eta),
             },
             Scene::Subsurface {
                 kr,
@@ -457,6 +497,47 @@ impl Parameters {
                 };
                 Bsdf::lobes(vec![Lobe::Metallic(lobe), Lobe::Specular(sheet)])
             }
+            Self::CoatedDiffuse {
+                reflectance,
+                eta,
+                roughness,
+            } => {
+                let base = reflectance.at(place);
+                Bsdf::metallic(Metallic::coated(base, eta.at(place), roughness.at(place)))
+            }
+            Self::CoatedConductor {
+                eta,
+                k,
+                roughness,
+                coat_eta,
+                coat_roughness,
+            } => {
+                let coat = coat_eta.at(place).max(1e-3);
+                let above = coat_roughness.values(place);
+                let spread = seen_through(roughness.values(place), above, coat);
+                let below = Fresnel::Coated {
+                    eta: eta.at(place),
+                    k: k.at(place),
+                    coat,
+                };
+                let facets = TrowbridgeReitz::new(above, false);
+                Bsdf::lobes(vec![
+                    Lobe::Glossy(GlossyReflection::new(
+                        Vec3::ONE,
+                        facets,
+                        Fresnel::Coat(coat),
+                    )),
+                    Lobe::Glossy(GlossyReflection::new(
+                        Vec3::ONE,
+                        TrowbridgeReitz::new(spread, false),
+                        below,
+                    )),
+                ])
+            }
+            Self::ThinDielectric { eta } => Bsdf::specular(Specular::Pane {
+                scale: Vec3::ONE,
+                eta: eta.at(place),
+            }),
             Self::Subsurface {
                 kr,
                 kt,
@@ -521,4 +602,16 @@ impl Parameters {
             }
         }
     }
+}
+
+/// Alphas of facets that reflect as wide as facets seen through a rough coat.
+///
+/// A facet tilted by a small d turns the mirror direction by 2 d inside, and by 2 d eta outside. A facet of the coat turns
+/// light by (eta - 1) d, on the way in and on the way out. Variances add up.
+fn seen_through(below: [f32; 2], coat: [f32; 2], eta: f32) -> [f32; 2] {
+    [0, 1].map(|axis| {
+        let own = eta * below[axis];
+        let passing = (eta - 1.0) * coat[axis];
+        (own * own + 0.5 * passing * passing).sqrt().min(1.0)
+    })
 }

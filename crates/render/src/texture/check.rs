@@ -80,7 +80,9 @@ impl Parts {
             | Texture::Uv(_)
             | Texture::Noise { .. }
             | Texture::VertexColor => Ok(()),
-            Texture::AtLeast { value, .. } | Texture::Dither(value) => self.param(value),
+            Texture::AtLeast { value, .. } | Texture::Root(value) | Texture::Dither(value) => {
+                self.param(value)
+            }
             Texture::Image(texture) => image(&texture.image),
         }
     }

@@ -190,6 +190,8 @@ pub enum Texture<T> {
     VertexColor,
     /// 1 where the value is at least a number, 0 elsewhere.
     AtLeast(Input<f32>, f32),
+    /// Square root of a value, or 0 below 0.
+    Root(Input<f32>),
     /// 1 with the value as its probability, 0 elsewhere.
     Dither(Input<f32>),
 }
@@ -280,6 +282,7 @@ impl<T: Value> Texture<T> {
             Self::AtLeast(value, least) => {
                 T::grey(if value.at(place) >= *least { 1.0 } else { 0.0 })
             }
+            Self::Root(value) => T::grey(value.at(place).max(0.0).sqrt()),
             Self::Dither(value) => {
                 let solid = fraction(place.point) < value.at(place);
                 T::grey(if solid { 1.0 } else { 0.0 })
@@ -355,6 +358,7 @@ impl Textures {
             },
             Scene::VertexColor => Texture::VertexColor,
             Scene::AtLeast { value, least } => Texture::AtLeast(self.input(value), *least),
+            Scene::Root(value) => Texture::Root(self.input(value)),
             Scene::Dither(value) => Texture::Dither(self.input(value)),
         }
     }

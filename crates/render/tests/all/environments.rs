@@ -9,8 +9,8 @@ use std::sync::Arc;
 
 use crate::support::*;
 use antumbra_scene::{
-    DirectStrategy, Environment, Image, Integrator, Light, LightStrategy, Material, Pixels, Rgb,
-    Scene,
+    DirectStrategy, Environment, EnvironmentMapping, Image, Integrator, Light, LightStrategy,
+    Material, Pixels, Rgb, Scene,
 };
 use glam::{Mat3, Quat, Vec3};
 
@@ -51,6 +51,7 @@ fn environment(
     Light::Infinite {
         radiance: Rgb::ONE,
         environment: Some(Environment {
+            mapping: EnvironmentMapping::LongitudeLatitude,
             image: Arc::new(image),
             world_from_light,
         }),

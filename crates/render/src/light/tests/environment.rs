@@ -17,6 +17,7 @@ fn noise(width: u32, height: u32, dark: f32) -> Arc<Image> {
 
 fn environment(image: Arc<Image>, world_from_light: Mat3) -> Light {
     let environment = antumbra_scene::Environment {
+        mapping: antumbra_scene::EnvironmentMapping::LongitudeLatitude,
         image,
         world_from_light,
     };

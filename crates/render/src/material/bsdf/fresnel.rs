@@ -14,6 +14,17 @@ pub enum Fresnel {
         /// Absorption coefficient.
         k: Vec3,
     },
+    /// Dielectric coat of this index of refraction, equal from both sides of the surface.
+    Coat(f32),
+    /// Conductor below a dielectric coat, without the light that the coat itself reflects.
+    Coated {
+        /// Index of refraction of the conductor.
+        eta: Vec3,
+        /// Absorption coefficient of the conductor.
+        k: Vec3,
+        /// Index of refraction of the coat.
+        coat: f32,
+    },
 }
 
 /// Unpolarised Fresnel reflectance for a direction with cosine `cos_i` to the normal.
@@ -52,6 +63,18 @@ pub fn conductor(cos: f32, eta: Vec3, k: Vec3) -> Vec3 {
     let (sum, part) = (cos2 * squares + Vec3::splat(sin2 * sin2), part * sin2);
     let parallel = perpendicular * (sum - part) / (sum + part);
     0.5 * (parallel + perpendicular)
+}
+
+/// Light that passes a smooth coat, is reflected by the conductor below, and leaves, by colour, for a direction with cosine
+/// `cos` to the normal. Light that goes to and fro in between is included.
+pub fn coated(cos: f32, eta: Vec3, k: Vec3, coat: f32) -> Vec3 {
+    let cos = cos.abs().min(1.0);
+    let reflected = dielectric(cos, coat);
+    let inside = (1.0 - (1.0 - cos * cos) / (coat * coat)).max(0.0).sqrt();
+    let below = conductor(inside, eta / coat, k / coat);
+    let passed = (1.0 - reflected) * (1.0 - reflected);
+    // The geometric series of reflections. At grazing angles nothing passes.
+    passed * below / (Vec3::ONE - reflected * below).max(Vec3::splat(f32::MIN_POSITIVE))
 }
 
 fn root(v: Vec3) -> Vec3 {

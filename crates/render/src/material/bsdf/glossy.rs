@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::fresnel::{Fresnel, conductor, dielectric};
+use super::fresnel::{Fresnel, coated, conductor, dielectric};
 use super::microfacet::TrowbridgeReitz;
 use crate::surface::{reflect, refract, same_hemisphere};
 
@@ -58,6 +58,12 @@ impl GlossyReflection {
             }
             Fresnel::Conductor { eta, k } => {
                 self.scale * conductor(wi.dot(h), eta, k) * (geometry / share)
+            }
+            Fresnel::Coat(eta) => {
+                self.scale * (dielectric(wi.dot(h).abs(), eta) * geometry / share)
+            }
+            Fresnel::Coated { eta, k, coat } => {
+                self.scale * coated(wi.dot(h), eta, k, coat) * (geometry / share)
             }
         }
     }

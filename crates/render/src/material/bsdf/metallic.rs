@@ -80,6 +80,26 @@ impl Metallic {
         (lobe, dielectric * transparent)
     }
 
+    /// Diffuse base of reflectance `base` below a coat of facets of this alpha, with the light that the two reflect to each
+    /// other.
+    ///
+    /// Of the light that leaves the base, the coat sends back `R = 1 - T / eta²`, where T is the mean of what passes from
+    /// outside. The sum over all returns makes `base (1 - R) / (1 - base R)` of the reflectance of the base.
+    pub fn coated(base: Vec3, eta: f32, alpha: f32) -> Self {
+        let eta = if eta >= 1.0 { eta } else { 1.0 / eta.max(1e-3) };
+        let straight = (eta - 1.0) / (eta + 1.0);
+        let (mut lobe, _) = Self::new(MetallicParameters {
+            color: base,
+            metallic: 0.0,
+            roughness: alpha.max(0.0).sqrt(),
+            coat: Vec3::splat(straight * straight),
+            transparent: 0.0,
+        });
+        let out = lobe.coat().mean_passed() / (eta * eta);
+        lobe.base = lobe.base * out / (Vec3::ONE - lobe.base * (Vec3::ONE - out));
+        lobe
+    }
+
     /// The dielectric's coat alone, for light that goes straight on.
     pub fn coat(&self) -> Coat {
         Coat {

@@ -30,6 +30,13 @@ pub enum Specular {
         /// The coat.
         coat: Coat,
     },
+    /// A thin pane: light is reflected at both sides, to and fro, or goes straight on.
+    Pane {
+        /// Scale of both.
+        scale: Vec3,
+        /// Index of refraction of the pane.
+        eta: f32,
+    },
     /// Light that goes straight on.
     Through {
         /// Share of the light.
@@ -52,7 +59,9 @@ impl Specular {
     /// Whether nothing is scattered.
     pub fn is_black(&self) -> bool {
         match *self {
-            Self::Mirror { kr: scale } | Self::Through { share: scale } => scale == Vec3::ZERO,
+            Self::Mirror { kr: scale }
+            | Self::Through { share: scale }
+            | Self::Pane { scale, .. } => scale == Vec3::ZERO,
             Self::Sheet { kt, .. } => kt == Vec3::ZERO,
             Self::Glass { kr, kt, .. } => kr == Vec3::ZERO && kt == Vec3::ZERO,
         }
@@ -68,6 +77,10 @@ impl Specular {
             Self::Sheet { kt, coat } => Self::Sheet {
                 kt: kt * scale,
                 coat,
+            },
+            Self::Pane { scale: own, eta } => Self::Pane {
+                scale: own * scale,
+                eta,
             },
             Self::Glass { kr, kt, eta } => Self::Glass {
                 kr: kr * scale,
@@ -87,6 +100,16 @@ impl Specular {
         match *self {
             Self::Mirror { .. } => self.reflection(wo),
             Self::Through { .. } | Self::Sheet { .. } => self.transmission(wo),
+            Self::Pane { scale, eta } => {
+                let sample = match choice < pane(wo.z, eta) {
+                    true => self.reflection(wo)?,
+                    false => self.transmission(wo)?,
+                };
+                Some(SpecularSample {
+                    weight: scale,
+                    ..sample
+                })
+            }
             Self::Glass { kr, .. } if kr == Vec3::ZERO => self.transmission(wo),
             Self::Glass { kt, .. } if kt == Vec3::ZERO => self.reflection(wo),
             Self::Glass { kr, kt, eta } => {
@@ -107,6 +130,7 @@ impl Specular {
         let weight = match *self {
             Self::Mirror { kr } => kr,
             Self::Glass { kr, eta, .. } => kr * dielectric(wo.z, eta),
+            Self::Pane { scale, eta } => scale * pane(wo.z, eta),
             Self::Through { .. } | Self::Sheet { .. } => return None,
         };
         (wo.z != 0.0).then_some(SpecularSample {
@@ -130,6 +154,11 @@ impl Specular {
                 weight: kt * coat.passed(wo.z),
                 eta: 1.0,
             }),
+            Self::Pane { scale, eta } => Some(SpecularSample {
+                wi: -wo,
+                weight: scale * (1.0 - pane(wo.z, eta)),
+                eta: 1.0,
+            }),
             Self::Glass { .. } if wo.z == 0.0 => None,
             Self::Glass { kt, eta, .. } => {
                 let ratio = entering(wo, eta);
@@ -144,6 +173,12 @@ impl Specular {
             }
         }
     }
+}
+
+/// Reflectance of both sides of a pane together: `R + T² R / (1 - R²)` with T = 1 - R.
+fn pane(cos: f32, eta: f32) -> f32 {
+    let once = dielectric(cos.abs(), eta);
+    2.0 * once / (1.0 + once)
 }
 
 /// Index of refraction on the side of `wo` over that on the other side.

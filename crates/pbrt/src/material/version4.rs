@@ -1,0 +1,248 @@
+//! Materials of pbrt-v4, with its parameters and defaults.
+
+use std::sync::Arc;
+
+use antumbra_scene::{Material, Param, Rgb, Texture};
+
+use super::{color, optional_roughness};
+use crate::named_spectra;
+use crate::params::{ParamType, Values};
+use crate::texture::Textured;
+
+/// Materials of pbrt-v4 that version 3 has not, or under another name.
+pub(crate) const SUPPORTED: &[&str] = &[
+    "coatedconductor",
+    "coateddiffuse",
+    "conductor",
+    "dielectric",
+    "diffuse",
+    "diffusetransmission",
+    "thindielectric",
+];
+
+/// Reads a material by its name. `None`: it has none of these names.
+pub(super) fn build(name: &str, values: &mut Textured) -> Option<Material> {
+    Some(match name {
+        "diffuse" => Material::Matte {
+            kd: values.param("reflectance", 0.5),
+            sigma: 0.0.into(),
+        },
+        "diffusetransmission" => diffuse_transmission(values),
+        "dielectric" => Material::Glass {
+            kr: Rgb::ONE.into(),
+            kt: Rgb::ONE.into(),
+            eta: index(values, "eta"),
+            roughness: alphas(values, ["roughness", "uroughness", "vroughness"], 0.0),
+            remap_roughness: false,
+        },
+        "thindielectric" => Material::ThinDielectric {
+            eta: index(values, "eta"),
+        },
+        "conductor" => {
+            let alphas = alphas(values, ["roughness", "uroughness", "vroughness"], 0.0);
+            conductor(values, alphas)
+        }
+        "coateddiffuse" => coated_diffuse(values),
+        "coatedconductor" => coated_conductor(values),
+        _ => return None,
+    })
+}
+
+/// Diffuse light on both sides. Together they must not gain energy, which pbrt-v4 does not check.
+fn diffuse_transmission(values: &mut Textured) -> Material {
+    let scale = values.lookup.float("scale", 1.0, values.report);
+    Material::Translucent {
+        kd: Rgb::splat(scale).into(),
+        ks: Rgb::ZERO.into(),
+        reflect: values.param("reflectance", 0.25),
+        transmit: values.param("transmittance", 0.25),
+        roughness: 0.0.into(),
+        remap_roughness: false,
+    }
+}
+
+/// Index of refraction: a number, or a glass by its name, which then has one index for all colours.
+fn index(values: &mut Textured, name: &'static str) -> Param<f32> {
+    if let Some((eta, span)) = values.find::<f32>(name) {
+        if let Param::Constant(number) = eta
+            && !(number > 0.0)
+        {
+            let message = format!("the index of refraction must be positive, found {number}");
+            values.report.error(span, message);
+            return 1.5.into();
+        }
+        return eta;
+    }
+    let Some(param) = values.lookup.find(name, &[ParamType::Spectrum]) else {
+        return 1.5.into();
+    };
+    let (text, found) = match &param.values {
+        Values::Strings(names) if names.len() == 1 => {
+            (&names[..1], named_spectra::index(&names[0]))
+        }
+        _ => (&[][..], None),
+    };
+    match found {
+        Some(index) => {
+            let message = "glass has one index of refraction for all colours, that of 587.6 nm";
+            values.report.note(param.declaration, message);
+            (index as f32).into()
+        }
+        None => {
+            let feature = format!(
+                "the spectrum {} as an index of refraction is",
+                text.join(" ")
+            );
+            values.report.unsupported(param.value, feature);
+            1.5.into()
+        }
+    }
+}
+
+/// Microfacet alphas along u and v: square roots of the roughness, unless `remaproughness` is off.
+fn alphas(values: &mut Textured, [both, u, v]: [&'static str; 3], default: f32) -> [Param<f32>; 2] {
+    let remap = values.lookup.bool("remaproughness", true, values.report);
+    let all = optional_roughness(values, both).unwrap_or(default.into());
+    [u, v].map(|name| {
+        let roughness = optional_roughness(values, name).unwrap_or_else(|| all.clone());
+        if remap { root(roughness) } else { roughness }
+    })
+}
+
+fn root(value: Param<f32>) -> Param<f32> {
+    match value {
+        Param::Constant(value) => value.max(0.0).sqrt().into(),
+        texture => Param::Texture(Arc::new(Texture::Root(texture))),
+    }
+}
+
+/// Spectrum of a metal. The default is copper.
+fn metal(values: &mut Textured, name: &'static str, copper: &str) -> Param<Rgb> {
+    let default = super::named_color(copper);
+    color(values, name, default.to_array())
+}
+
+fn conductor(values: &mut Textured, roughness: [Param<f32>; 2]) -> Material {
+    let reflectance = values.find::<Rgb>("reflectance");
+    if let Some((_, span)) = reflectance
+        && (values.lookup.has("eta") || values.lookup.has("k"))
+    {
+        let message = "a conductor has \"reflectance\", or \"eta\" and \"k\", not both";
+        values.report.error(span, message);
+    }
+    match reflectance {
+        Some((Param::Texture(texture), span)) => {
+            values.report.note(
+                span,
+                "a texture of a conductor's reflectance is rendered with Schlick's Fresnel term",
+            );
+            let [u, _] = roughness;
+            Material::Metallic {
+                color: Param::Texture(texture),
+                metallic: 1.0.into(),
+                roughness: root(u),
+                coat: Rgb::ZERO.into(),
+                transmission: 0.0.into(),
+            }
+        }
+        Some((Param::Constant(reflectance), _)) => Material::Metal {
+            eta: Rgb::ONE.into(),
+            k: absorption_of(reflectance).into(),
+            roughness,
+            remap_roughness: false,
+        },
+        None => Material::Metal {
+            eta: metal(values, "eta", "metal-Cu-eta"),
+            k: metal(values, "k", "metal-Cu-k"),
+            roughness,
+            remap_roughness: false,
+        },
+    }
+}
+
+/// Absorption that, with index 1, reflects so much straight on, as in pbrt-v4.
+fn absorption_of(reflectance: Rgb) -> Rgb {
+    let r = reflectance.clamp(Rgb::ZERO, Rgb::splat(0.9999));
+    Rgb::from(r.to_array().map(|r| 2.0 * r.sqrt() / (1.0 - r).sqrt()))
+}
+
+/// Refuses a medium between coat and base, and leaves out how pbrt-v4 walks between them.
+fn layers(values: &mut Textured) {
+    let albedo = values.find::<Rgb>("albedo");
+    if albedo.is_some_and(|(albedo, _)| albedo.constant() != Some(&Rgb::ZERO)) {
+        let feature = "a medium between coat and base (\"albedo\") is";
+        values.report.unsupported(values.lookup.at, feature);
+    }
+    // Without a medium, these change noise only.
+    let _ = values.find::<f32>("g");
+    for steps in ["maxdepth", "nsamples"] {
+        let _ = values.lookup.integer_from(steps, 1, 0, values.report);
+    }
+}
+
+fn coated_diffuse(values: &mut Textured) -> Material {
+    layers(values);
+    let _ = values.find::<f32>("thickness");
+    let [u, v] = alphas(values, ["roughness", "uroughness", "vroughness"], 0.0);
+    let roughness = match (u, v) {
+        (Param::Constant(u), Param::Constant(v)) if u != v => {
+            values.report.note(
+                values.lookup.at,
+                "coateddiffuse has one roughness: the geometric mean of both",
+            );
+            (u * v).sqrt().into()
+        }
+        (u, v) => {
+            if u != v {
+                let feature = "coateddiffuse with a texture of roughness along u or v alone is";
+                values.report.unsupported(values.lookup.at, feature);
+            }
+            u
+        }
+    };
+    Material::CoatedDiffuse {
+        reflectance: values.param("reflectance", 0.5),
+        eta: index(values, "eta"),
+        roughness,
+    }
+}
+
+fn coated_conductor(values: &mut Textured) -> Material {
+    layers(values);
+    let _ = values.find::<f32>("thickness");
+    let _ = values.find::<f32>("interface.thickness");
+    let coat_names = [
+        "interface.roughness",
+        "interface.uroughness",
+        "interface.vroughness",
+    ];
+    let names = [
+        "conductor.roughness",
+        "conductor.uroughness",
+        "conductor.vroughness",
+    ];
+    let coat_roughness = alphas(values, coat_names, 0.0);
+    let roughness = alphas(values, names, 0.0);
+    let coat_eta = index(values, "interface.eta");
+    let (eta, k) = match values.find::<Rgb>("reflectance") {
+        Some((Param::Constant(reflectance), _)) => {
+            (Rgb::ONE.into(), absorption_of(reflectance).into())
+        }
+        Some((Param::Texture(_), span)) => {
+            let feature = "a texture of the reflectance of coatedconductor is";
+            values.report.unsupported(span, feature);
+            (Rgb::ONE.into(), Rgb::ONE.into())
+        }
+        None => (
+            metal(values, "conductor.eta", "metal-Cu-eta"),
+            metal(values, "conductor.k", "metal-Cu-k"),
+        ),
+    };
+    Material::CoatedConductor {
+        eta,
+        k,
+        roughness,
+        coat_eta,
+        coat_roughness,
+    }
+}
