@@ -85,9 +85,17 @@ const ILLUMINANTS: &[(&str, [f64; 2])] = &[
     ("illum-acesD60", [0.32168, 0.33767]),
 ];
 
-/// All names, metals as one of `eta` and one of `k`.
 #[cfg(test)]
-pub(crate) const METALS: &[&str] = &["Ag", "Al", "Au", "Cu", "MgO", "TiO2"];
+const METALS: &[&str] = &["Ag", "Al", "Au", "Cu", "MgO", "TiO2"];
+
+/// All names, metals without their ending.
+#[cfg(test)]
+pub(crate) fn names() -> Vec<String> {
+    let metals = METALS.iter().map(|metal| format!("metal-{metal}"));
+    let others = GLASSES.iter().map(|(name, _)| *name);
+    let others = others.chain(ILLUMINANTS.iter().map(|(name, _)| *name));
+    metals.chain(others.map(str::to_owned)).collect()
+}
 
 /// Relative power of CIE D65 from 360 to 830 nm, every 10 nm.
 #[rustfmt::skip]

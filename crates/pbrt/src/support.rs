@@ -61,6 +61,18 @@ const GROUPS: &[Group] = &[
         scene: r#"WorldBegin Material "NAME" WorldEnd"#,
     },
     Group {
+        heading: "Materials of pbrt-v4",
+        supported: material::version4::SUPPORTED,
+        unsupported: material::version4::UNSUPPORTED,
+        scene: r#"Film "rgb" WorldBegin Material "NAME""#,
+    },
+    Group {
+        heading: "Shapes of pbrt-v4",
+        supported: shape::SUPPORTED4,
+        unsupported: &[],
+        scene: r#"Film "rgb" WorldBegin Shape "NAME""#,
+    },
+    Group {
         heading: "Textures",
         supported: texture::SUPPORTED,
         unsupported: texture::UNSUPPORTED,
@@ -142,7 +154,7 @@ fn the_document_lists_what_the_code_knows() {
         assert_eq!(marked(true), set(unsupported), "{heading}");
     }
     // Tables without a list in the code.
-    let others = ["Films", "Scenes of pbrt-v4"];
+    let others = ["Films", "Named spectra of pbrt-v4"];
     for heading in tables.keys() {
         let is_known = groups.iter().any(|group| group.0 == *heading);
         assert!(is_known || others.contains(heading), "{heading}");
@@ -182,4 +194,17 @@ fn the_reader_knows_what_is_listed() {
         let said = said("qzx");
         assert!(said.contains("unknown"), "{}: {said}", group.heading);
     }
+}
+
+/// Every named spectrum that the document lists is known, and none is missing.
+#[test]
+fn the_document_lists_the_spectra() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/src/pbrt-support.md");
+    let text = std::fs::read_to_string(path).unwrap();
+    let tables = tables(&text);
+    let rows = &tables["Named spectra of pbrt-v4"];
+    let listed: BTreeSet<&str> = rows.iter().map(|(name, _)| *name).collect();
+    let known = crate::named_spectra::names();
+    let known: BTreeSet<&str> = known.iter().map(String::as_str).collect();
+    assert_eq!(listed, known);
 }

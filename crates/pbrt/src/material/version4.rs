@@ -20,6 +20,10 @@ pub(crate) const SUPPORTED: &[&str] = &[
     "thindielectric",
 ];
 
+/// Materials of pbrt-v4 that are not supported.
+#[cfg(test)]
+pub(crate) const UNSUPPORTED: &[&str] = &["measured"];
+
 /// Reads a material by its name. `None`: it has none of these names.
 pub(super) fn build(name: &str, values: &mut Textured) -> Option<Material> {
     Some(match name {

@@ -106,6 +106,24 @@ fn uber([kd, ks, kr, kt]: [f32; 4], opacity: f32, eta: f32) -> Material {
     }
 }
 
+fn coated(reflectance: f32, eta: f32, alpha: f32) -> Material {
+    Material::CoatedDiffuse {
+        reflectance: Vec3::splat(reflectance).into(),
+        eta: eta.into(),
+        roughness: alpha.into(),
+    }
+}
+
+fn coated_metal([eta, k]: [f32; 2], roughness: f32, coat_eta: f32, coat: [f32; 2]) -> Material {
+    Material::CoatedConductor {
+        eta: Vec3::splat(eta).into(),
+        k: Vec3::splat(k).into(),
+        roughness: [roughness; 2].map(Param::Constant),
+        coat_eta: coat_eta.into(),
+        coat_roughness: coat.map(Param::Constant),
+    }
+}
+
 fn mix(first: Material, second: Material, amount: f32) -> Material {
     Material::Mix {
         materials: [Arc::new(first), Arc::new(second)],
@@ -156,6 +174,18 @@ fn materials() -> Vec<(&'static str, Material, Holds)> {
         ),
         ("rough metal", metallic(0.9, [1.0, 1.0], 0.04, 0.0), Energy),
         ("half metal", metallic(0.7, [0.5, 0.7], 0.04, 0.0), Energy),
+        ("coated white", coated(1.0, 1.5, 0.2), Energy),
+        ("coated grey", coated(0.5, 1.8, 0.6), Energy),
+        (
+            "coated metal",
+            coated_metal([0.2, 3.9], 0.3, 1.5, [0.2, 0.2]),
+            Energy,
+        ),
+        (
+            "brushed coat",
+            coated_metal([1.5, 7.0], 0.2, 1.4, [0.2, 0.5]),
+            Energy,
+        ),
         ("foil", metallic(0.8, [0.1, 0.5], 0.04, 0.6), Energy),
     ]
 }
@@ -336,6 +366,94 @@ fn smooth_glass_keeps_energy() {
             mean += lobe.weight.x / 4096.0;
         }
         assert!((mean - reflected - passed).abs() < 0.01, "{wo}");
+    }
+}
+
+/// A white base under any coat reflects all light, and a coat makes coloured bases darker: light that returns to the base is
+/// absorbed again.
+#[test]
+fn white_bases_under_coats_lose_nothing() {
+    let mean = |material: &Material, wo: Vec3| {
+        let bsdf = bsdf(material);
+        let count = 1 << 14;
+        let sum: f64 = streams(count)
+            .filter_map(|stream| {
+                let wi = bsdf.sample(wo, stream.uniform(0), stream.pair(1))?;
+                let e = evaluate(&bsdf, wo, wi);
+                (e.pdf > 0.0).then(|| f64::from(e.value.x * wi.z.abs() / e.pdf))
+            })
+            .sum();
+        sum / f64::from(count)
+    };
+    for wo in views() {
+        for (eta, alpha) in [(1.5, 0.0), (1.5, 0.25), (1.3, 0.8), (2.4, 0.1)] {
+            let white = mean(&coated(1.0, eta, alpha), wo);
+            assert!((white - 1.0).abs() < 0.012, "{wo} {eta} {alpha}: {white}");
+        }
+        // Less than the base times what passes and the reflection of the coat would add up to.
+        let [coated, paint] = [coated(0.5, 1.5, 0.25), metallic(0.5, [0.0, 0.5], 0.04, 0.0)]
+            .map(|material| mean(&material, wo));
+        assert!(coated < 0.9 * paint, "{wo}: {coated} {paint}");
+    }
+}
+
+/// The series of returns, with Fresnel's formulas in the place of Schlick's: straight on, a smooth coat of index 1.5 over a
+/// base of 0.5 has `(1 - 0.04)² 0.5 / (π 2.25 (1 - 0.5 R))` with R = 0.596, the mean reflectance from inside.
+#[test]
+fn smooth_coats_have_the_value_of_the_series() {
+    let bsdf = bsdf(&coated(0.5, 1.5, 0.0));
+    let [wo, wi] = [Vec3::Z, Vec3::new(0.2, 0.0, 1.0).normalize()];
+    let found = f64::from(evaluate(&bsdf, wo, wi).value.x);
+    let expected = 0.96 * 0.96 * 0.5 / (std::f64::consts::PI * 2.25 * (1.0 - 0.5 * 0.596));
+    assert!((found / expected - 1.0).abs() < 0.02, "{found} {expected}");
+}
+
+/// A coat of index 1 is none. Smooth coats over mirrors reflect `F + (1 - F)² C / (1 - F C)`.
+#[test]
+fn coats_over_conductors() {
+    let bare = bsdf(&metal(0.2, 3.9, [0.3, 0.3]));
+    let under = bsdf(&coated_metal([0.2, 3.9], 0.3, 1.0, [0.3, 0.3]));
+    for wo in views() {
+        for stream in streams(100) {
+            let wi = uniform_sphere(stream.pair(3));
+            let [bare, under] = [&bare, &under].map(|bsdf| evaluate(bsdf, wo, wi).value.x);
+            assert!(
+                (bare - under).abs() <= 1e-3 * bare + 1e-6,
+                "{wo} {wi}: {bare} {under}"
+            );
+        }
+    }
+    // Straight on: F = 0.04, and the metal of index 1.5 n has the reflectance C of n in vacuum.
+    let (n, k) = (Vec3::splat(0.3), Vec3::splat(4.5));
+    let c = ((0.2_f32 - 1.0).powi(2) + 9.0) / ((0.2_f32 + 1.0).powi(2) + 9.0);
+    let found = fresnel::coated(1.0, n, k, 1.5).x;
+    let expected = 0.96 * 0.96 * c / (1.0 - 0.04 * c);
+    assert!((found - expected).abs() < 1e-4, "{found} {expected}");
+    assert_eq!(fresnel::coated(0.0, n, k, 1.5), Vec3::ZERO, "grazing");
+}
+
+/// A pane reflects `2 F / (1 + F)` and lets the rest pass, straight on.
+#[test]
+fn panes_keep_energy() {
+    let pane = bsdf(&Material::ThinDielectric { eta: 1.5.into() });
+    for wo in views() {
+        let reflected = pane.delta_reflection(wo).expect("a reflection").weight.x;
+        let passed = pane.delta_transmission(wo, 0.5).expect("light goes on");
+        assert_eq!((passed.wi, passed.eta), (-wo, 1.0));
+        assert!((reflected + passed.weight.x - 1.0).abs() < 1e-6, "{wo}");
+        if wo == Vec3::Z {
+            assert!((reflected - 0.08 / 1.04).abs() < 1e-5, "{reflected}");
+        }
+        let mut share = 0.0;
+        for stream in streams(4096) {
+            let lobe = pane.sample_delta(wo, stream.uniform(0)).expect("a lobe");
+            assert_eq!(lobe.weight, Vec3::ONE);
+            share += f32::from(u8::from(lobe.wi.z * wo.z > 0.0)) / 4096.0;
+        }
+        assert!(
+            (share - reflected).abs() < 0.01,
+            "{wo}: {share} {reflected}"
+        );
     }
 }
 
