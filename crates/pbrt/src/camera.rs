@@ -1,6 +1,6 @@
 //! Directive for the camera, with the parameters and defaults of pbrt-v3.
 
-use antumbra_scene::Camera;
+use antumbra_scene::{Camera, Projection};
 use glam::{DMat4, DVec3, Mat3A};
 
 use crate::directive::Quoted;
@@ -12,10 +12,10 @@ use crate::state::Transforms;
 use crate::{suggest, transform};
 
 /// Supported cameras.
-pub(crate) const SUPPORTED: &[&str] = &["perspective"];
+pub(crate) const SUPPORTED: &[&str] = &["environment", "orthographic", "perspective"];
 
 /// Cameras of pbrt-v3 that are not supported.
-pub(crate) const UNSUPPORTED: &[&str] = &["environment", "orthographic", "realistic"];
+pub(crate) const UNSUPPORTED: &[&str] = &["realistic"];
 
 /// Handles `Camera`. Returns the camera, which is measured from `origin`, and, in double precision, camera to world space.
 pub(crate) fn declare(
@@ -58,6 +58,29 @@ pub(crate) fn declare(
     let mut camera = Camera::default();
     match kind.text.as_str() {
         "perspective" => camera = perspective(&mut lookup, report),
+        "orthographic" => {
+            let plane = plane(&mut lookup, report);
+            camera = Camera {
+                projection: Projection::Orthographic,
+                ..plane
+            };
+        }
+        "environment" => {
+            // As in pbrt-v3, which reads them without effect.
+            let _ = plane(&mut lookup, report);
+            camera.projection = Projection::Spherical;
+        }
+        "spherical" if report.is_version4 => {
+            let _ = plane(&mut lookup, report);
+            camera.projection = lookup.choice(
+                "mapping",
+                [
+                    ("equalarea", Projection::EqualArea),
+                    ("equirectangular", Projection::Spherical),
+                ],
+                report,
+            );
+        }
         name if UNSUPPORTED.contains(&name) => {
             report.unsupported_kind(kind.span, "camera", name, SUPPORTED);
             lookup.ignore_all();
@@ -77,13 +100,10 @@ pub(crate) fn declare(
 }
 
 fn perspective(lookup: &mut Lookup, report: &mut Report) -> Camera {
-    let defaults = Camera::default();
-    for name in ["shutteropen", "shutterclose"] {
-        lookup.left_out(name, &[ParamType::Float], "nothing moves", report);
-    }
+    let plane = plane(lookup, report);
     // A positive "halffov" takes precedence over "fov", as in pbrt.
     let half = lookup.float("halffov", -1.0, report);
-    let full = lookup.float("fov", defaults.fov, report);
+    let full = lookup.float("fov", plane.fov, report);
     let fov = if half > 0.0 { 2.0 * half } else { full };
     if !(fov > 0.0 && fov < 180.0) {
         let name = if half > 0.0 { "halffov" } else { "fov" };
@@ -94,6 +114,19 @@ fn perspective(lookup: &mut Lookup, report: &mut Report) -> Camera {
             place,
             format!("a field of view of {fov} degrees is not between 0 and 180"),
         );
+    }
+    Camera { fov, ..plane }
+}
+
+/// Shutter, screen window and lens, which cameras share.
+fn plane(lookup: &mut Lookup, report: &mut Report) -> Camera {
+    let defaults = Camera::default();
+    for name in ["shutteropen", "shutterclose"] {
+        match report.is_version4 {
+            // The film knows how long the shutter is open.
+            true => drop(lookup.find(name, &[ParamType::Float])),
+            false => lookup.left_out(name, &[ParamType::Float], "nothing moves", report),
+        }
     }
     let screen_window = lookup.floats::<4>("screenwindow", report);
     if let Some(window @ [x0, x1, y0, y1]) = screen_window
@@ -106,7 +139,6 @@ fn perspective(lookup: &mut Lookup, report: &mut Report) -> Camera {
     let has_aspect = lookup.has("frameaspectratio");
     let frame_aspect_ratio = lookup.float_in("frameaspectratio", 1.0, aspect, report);
     Camera {
-        fov,
         screen_window,
         frame_aspect_ratio: has_aspect.then_some(frame_aspect_ratio),
         lens_radius: lookup.float_in("lensradius", 0.0, [0.0, f32::MAX], report),

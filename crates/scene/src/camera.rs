@@ -1,9 +1,9 @@
-//! Camera: position, field of view and lens.
+//! Camera: position, projection, field of view and lens.
 
 use glam::Mat4;
 use serde::Serialize;
 
-/// Perspective camera with an optional thin lens.
+/// Camera, perspective by default, with an optional thin lens.
 ///
 /// Camera space is left-handed as in pbrt: x to the right, y up, z into the picture. `world_from_camera` may
 /// contain a reflection, as in scenes with `Scale -1 1 1`.
@@ -11,9 +11,12 @@ use serde::Serialize;
 pub struct Camera {
     /// Camera space to world space.
     pub world_from_camera: Mat4,
-    /// Full angle of view over the *shorter* side of the screen window, in degrees, in (0, 180).
+    /// How directions become points of the picture.
+    pub projection: Projection,
+    /// Full angle of view over the *shorter* side of the screen window, in degrees, in (0, 180). Of perspective only.
     pub fov: f32,
-    /// Screen window `[x_min, x_max, y_min, y_max]` on the plane that `fov` scales to ±1 along the shorter side.
+    /// Screen window `[x_min, x_max, y_min, y_max]` on the plane that `fov` scales to ±1 along the shorter side, or in units of
+    /// camera space if the projection is orthographic.
     ///
     /// `None` means ±1 along the shorter side of the picture and ±aspect along the longer.
     pub screen_window: Option<[f32; 4]>,
@@ -27,10 +30,32 @@ pub struct Camera {
     pub medium: Option<u32>,
 }
 
+/// How directions become points of the picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub enum Projection {
+    /// From one point through a plane.
+    #[default]
+    Perspective,
+    /// Along z, from the plane of the camera.
+    Orthographic,
+    /// All directions by longitude, along x, and latitude. The upper edge is y, the left edge x, and the second quarter z.
+    Spherical,
+    /// All directions on an octahedron of equal areas, whose middle is y.
+    EqualArea,
+}
+
+impl Projection {
+    /// Whether the picture shows all directions around the camera. Lens and screen window count for nothing then.
+    pub fn is_all_around(self) -> bool {
+        matches!(self, Self::Spherical | Self::EqualArea)
+    }
+}
+
 impl Default for Camera {
     fn default() -> Self {
         Self {
             world_from_camera: Mat4::IDENTITY,
+            projection: Projection::Perspective,
             fov: 90.0,
             screen_window: None,
             frame_aspect_ratio: None,

@@ -47,7 +47,7 @@ pub mod shape;
 pub mod texture;
 pub mod transform;
 
-pub use camera::Camera;
+pub use camera::{Camera, Projection};
 pub use film::{Film, Filter};
 pub use flatten::{Error, MAX_FLAT_TRIANGLES};
 pub use fourier::FourierTable;

@@ -17,7 +17,7 @@ mod emitter_tree;
 mod environment;
 mod goniometric;
 mod image;
-mod octahedron;
+pub mod octahedron;
 mod point;
 mod projection;
 mod sky;
@@ -36,6 +36,7 @@ pub use choice::Lights;
 pub use emitter::Emitter;
 pub use emitter_tree::{EmitterTree, before};
 use environment::Environment;
+pub use image::longitude_latitude;
 use point::Point;
 use sky::Sky;
 

@@ -52,6 +52,18 @@ pub fn place(dir: Vec3) -> [f32; 2] {
     [u.copysign(dir.x), v.copysign(dir.y)].map(|w| (0.5 * (w + 1.0)).clamp(0.0, 1.0))
 }
 
+/// Place in the square of a place a little outside: an edge is folded at its middle.
+pub fn wrap([s, t]: [f32; 2]) -> [f32; 2] {
+    let fold = |inside: f32, other: f32| match inside {
+        w if w < 0.0 => (-w, 1.0 - other),
+        w if w > 1.0 => (2.0 - w, 1.0 - other),
+        w => (w, other),
+    };
+    let (s, t) = fold(s, t);
+    let (t, s) = fold(t, s);
+    [s, t]
+}
+
 /// Colour at a place of the square.
 pub fn lookup(image: &Image, [s, t]: [f32; 2]) -> Vec3 {
     // NaN becomes 0.

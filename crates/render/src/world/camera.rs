@@ -1,20 +1,26 @@
 //! Camera rays: from a point on the film to a ray in the world.
 
+use std::f32::consts::{PI, TAU};
+
 use antumbra::Ray;
-use antumbra_scene::Film;
+use antumbra_scene::{Film, Projection};
 use glam::{Affine3A, Mat4, Vec3};
 
 use crate::Error;
+use crate::light::{longitude_latitude, octahedron};
 use crate::sampler::warp::disk;
 
-/// A perspective camera, ready to make rays.
+/// A camera, ready to make rays.
 #[derive(Clone, Debug)]
 pub struct Camera {
     world_from_camera: Mat4,
     camera_from_world: Mat4,
     /// Centre of the lens in the world.
     eye: Vec3,
-    /// Position of the film point (0, 0) on the plane z = 1.
+    projection: Projection,
+    /// Number of pixels across and down.
+    size: [f32; 2],
+    /// Position of the film point (0, 0) on the plane z = 1, or on the camera's own plane if the projection is orthographic.
     corner: [f32; 2],
     /// Change of that position per pixel.
     step: [f32; 2],
@@ -31,7 +37,7 @@ impl Camera {
     /// [`Error::CameraMatrix`] if the matrix is not finite or flattens space.
     pub fn new(camera: &antumbra_scene::Camera, film: &Film) -> Result<Self, Error> {
         let fov = camera.fov;
-        if !(fov > 0.0 && fov < 180.0) {
+        if camera.projection == Projection::Perspective && !(fov > 0.0 && fov < 180.0) {
             return Err(Error::FieldOfView { degrees: fov });
         }
         let matrix = camera.world_from_camera;
@@ -46,17 +52,25 @@ impl Camera {
         } else {
             [-1.0, 1.0, -1.0 / aspect, 1.0 / aspect]
         });
-        let scale = libm::tan(f64::from(fov).to_radians() / 2.0) as f32;
+        let scale = match camera.projection {
+            Projection::Perspective => libm::tan(f64::from(fov).to_radians() / 2.0) as f32,
+            _ => 1.0,
+        };
         Ok(Self {
             world_from_camera: matrix,
             eye: matrix.project_point3(Vec3::ZERO),
             camera_from_world: matrix.inverse(),
+            projection: camera.projection,
+            size: [width, height],
             corner: [scale * x_min, scale * y_max],
             step: [
                 scale * (x_max - x_min) / width,
                 scale * (y_min - y_max) / height,
             ],
-            lens_radius: camera.lens_radius,
+            lens_radius: match camera.projection.is_all_around() {
+                true => 0.0,
+                false => camera.lens_radius,
+            },
             focal_distance: camera.focal_distance,
             medium: camera.medium,
         })
@@ -65,17 +79,53 @@ impl Camera {
     /// Ray of film point (x, y), in pixels from the top left corner, through the lens point that `lens` in
     /// `[0, 1)²` chooses. The direction has unit length.
     pub fn ray(&self, film: [f32; 2], lens: [f32; 2]) -> Ray {
+        if self.projection.is_all_around() {
+            return self.ray_from(self.eye, self.direction(film));
+        }
         let through = Vec3::new(
             self.corner[0] + film[0] * self.step[0],
             self.corner[1] + film[1] * self.step[1],
             1.0,
         );
+        if self.projection == Projection::Orthographic {
+            let from = through - Vec3::Z;
+            let [x, y] = match self.has_lens() {
+                true => disk(lens).map(|side| side * self.lens_radius),
+                false => [0.0; 2],
+            };
+            // All points of the lens see one point in focus.
+            let toward = Vec3::new(-x, -y, self.focal_distance);
+            return self.to_world(from + Vec3::new(x, y, 0.0), toward);
+        }
         if !self.has_lens() {
             return self.ray_from(self.eye, through);
         }
         let [x, y] = disk(lens);
         let org = Vec3::new(x * self.lens_radius, y * self.lens_radius, 0.0);
         self.to_world(org, through * self.focal_distance - org)
+    }
+
+    /// Direction of a film point in the space of a camera that sees all around.
+    fn direction(&self, film: [f32; 2]) -> Vec3 {
+        let at = [film[0] / self.size[0], film[1] / self.size[1]];
+        if self.projection == Projection::EqualArea {
+            // The octahedron stands on z.
+            let dir = octahedron::direction(octahedron::wrap(at));
+            return Vec3::new(dir.x, dir.z, dir.y);
+        }
+        let (sin_turn, turn) = libm::sincosf(TAU * at[0]);
+        let (sin, cos) = libm::sincosf(PI * at[1]);
+        Vec3::new(sin * turn, cos, sin * sin_turn)
+    }
+
+    /// Film point of a direction, the inverse of [`Self::direction`].
+    fn film(&self, dir: Vec3) -> [f32; 2] {
+        let turned = Vec3::new(dir.x, dir.z, dir.y);
+        let at = match self.projection {
+            Projection::EqualArea => octahedron::place(turned),
+            _ => longitude_latitude(turned),
+        };
+        [at[0] * self.size[0], at[1] * self.size[1]]
     }
 
     /// Medium around the camera. `None` is vacuum.
@@ -93,6 +143,15 @@ impl Camera {
     pub fn neighbours(&self, ray: &Ray, distance: f32) -> [Ray; 2] {
         let org = self.camera_from_world.project_point3(ray.org.into());
         let dir = self.camera_from_world.transform_vector3(ray.dir.into());
+        if self.projection.is_all_around() {
+            let [x, y] = self.film(dir);
+            return [[x + distance, y], [x, y + distance]]
+                .map(|film| self.ray_from(self.eye, self.direction(film)));
+        }
+        if self.projection == Projection::Orthographic {
+            let [x, y] = self.step.map(|step| step * distance);
+            return [Vec3::X * x, Vec3::Y * y].map(|further| self.to_world(org + further, dir));
+        }
         // Scales the direction to the length that `Camera::ray` gives it before it normalizes.
         let (dir, reach) = if self.has_lens() {
             (dir * (self.focal_distance / dir.z), self.focal_distance)
@@ -103,8 +162,11 @@ impl Camera {
         [Vec3::X * x, Vec3::Y * y].map(|further| self.to_world(org, dir + further))
     }
 
-    /// Distance of a point from the camera along its axis, in units of the world.
+    /// Distance of a point from the camera along its axis, in units of the world. Distance from its place if it sees all around.
     pub fn depth(&self, point: Vec3) -> f32 {
+        if self.projection.is_all_around() {
+            return point.distance(self.eye);
+        }
         let axis = self.world_from_camera.transform_vector3(Vec3::Z);
         (point - self.eye).dot(axis) / axis.length()
     }
@@ -195,6 +257,64 @@ mod tests {
                 let expected = camera.ray(film, lens);
                 near(found.org, expected.org);
                 near(found.dir, expected.dir);
+            }
+        }
+    }
+
+    #[test]
+    fn orthographic_rays_are_parallel_and_meet_in_focus() {
+        let mut scene = camera();
+        scene.projection = Projection::Orthographic;
+        scene.screen_window = Some([-3.0, 3.0, -2.0, 2.0]);
+        let plain = Camera::new(&scene, &film(60, 40)).unwrap();
+        let ray = plain.ray([60.0, 0.0], [0.7; 2]);
+        near(ray.org, [3.0, 2.0, 0.0]);
+        near(ray.dir, [0.0, 0.0, 1.0]);
+        scene.lens_radius = 0.5;
+        scene.focal_distance = 4.0;
+        let lens = Camera::new(&scene, &film(60, 40)).unwrap();
+        for at in [[0.1, 0.9], [0.5, 0.5]] {
+            let ray = lens.ray([30.0, 10.0], at);
+            let (org, dir) = (Vec3::from(ray.org), Vec3::from(ray.dir));
+            near((org + dir * (4.0 / dir.z)).to_array(), [0.0, 1.0, 4.0]);
+            let next = lens.ray([30.5, 10.0], at);
+            let found = lens.neighbours(&ray, 0.5)[0];
+            near(found.org, next.org);
+            near(found.dir, next.dir);
+        }
+    }
+
+    /// The directions of pbrt: up at the upper edge, x at the left, z a quarter further. Neighbours are those of the film.
+    #[test]
+    fn all_around_cameras_see_every_direction() {
+        for projection in [Projection::Spherical, Projection::EqualArea] {
+            let scene = antumbra_scene::Camera {
+                projection,
+                world_from_camera: Mat4::from_translation(Vec3::ONE),
+                ..camera()
+            };
+            let camera = Camera::new(&scene, &film(80, 40)).unwrap();
+            for film in [[13.0, 9.0], [71.5, 31.5], [45.25, 20.5]] {
+                let ray = camera.ray(film, [0.5; 2]);
+                near(ray.org, [1.0; 3]);
+                let neighbours = camera.neighbours(&ray, 0.5);
+                let further = [[film[0] + 0.5, film[1]], [film[0], film[1] + 0.5]];
+                for (found, film) in neighbours.iter().zip(further) {
+                    near(found.dir, camera.ray(film, [0.5; 2]).dir);
+                }
+            }
+            assert_eq!(camera.depth(Vec3::new(1.0, 1.0, -2.0)), 3.0);
+            if projection == Projection::Spherical {
+                near(camera.ray([0.0, 20.0], [0.0; 2]).dir, [1.0, 0.0, 0.0]);
+                near(camera.ray([20.0, 20.0], [0.0; 2]).dir, [0.0, 0.0, 1.0]);
+                near(camera.ray([33.0, 0.0], [0.0; 2]).dir, [0.0, 1.0, 0.0]);
+            } else {
+                near(camera.ray([40.0, 20.0], [0.0; 2]).dir, [0.0, 1.0, 0.0]);
+                // Beyond an edge, the square goes on where it is folded.
+                near(
+                    camera.ray([-2.0, 15.0], [0.0; 2]).dir,
+                    camera.ray([2.0, 25.0], [0.0; 2]).dir,
+                );
             }
         }
     }

@@ -94,6 +94,41 @@ fn a_plane_reflects_the_integral_of_the_image() {
     }
 }
 
+/// Radiance cos² on an octahedron of equal areas, by its formula for the polar angle: z = ±(1 - r²), where 1 - r is the distance
+/// from the fold.
+#[test]
+fn a_plane_reflects_the_integral_of_an_octahedron() {
+    let side = 128;
+    let mut scene = empty();
+    scene.camera = look(Vec3::new(1.0, 0.5, 1.0), Vec3::Z * 3.0, 0.05);
+    add(&mut scene, floor(3.0), matte(0.5));
+    let mut sky = environment([side; 2], upside_down(), |x, y| {
+        let part = |k: u32| (2.0 * (k as f32 + 0.5) / side as f32 - 1.0).abs();
+        let height = 1.0 - part(x) - part(y);
+        let radius = 1.0 - height.abs();
+        let cos = 1.0 - radius * radius;
+        // The lower half is black, to tell the halves apart.
+        [if height > 0.0 { cos * cos } else { 0.0 }; 3]
+    });
+    if let Light::Infinite {
+        environment: Some(environment),
+        ..
+    } = &mut sky
+    {
+        environment.mapping = EnvironmentMapping::EqualArea;
+    }
+    scene.lights = vec![sky];
+    for integrator in [
+        path(1, LightStrategy::Spatial),
+        direct(DirectStrategy::All),
+        direct(DirectStrategy::One),
+    ] {
+        scene.integrator = integrator;
+        let found = mean(&picture(&scene, 256));
+        near(found, 0.25, 0.005, &format!("{integrator:?}"));
+    }
+}
+
 #[test]
 fn the_camera_sees_the_image() {
     let mut scene = empty();
