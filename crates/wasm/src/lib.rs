@@ -7,6 +7,6 @@
 //! - `names`: functions that the script calls
 
 mod module;
-mod names;
+pub mod names;
 
 pub use module::{Hits, Module};

@@ -31,8 +31,10 @@ pub struct Module {
     pub hits: Hits,
     /// Why the last call failed.
     pub error: String,
-    meshes: Vec<(Vec<[f32; 3]>, Vec<[u32; 3]>)>,
-    scenes: Vec<Option<Bvh>>,
+    /// Meshes that [`Module::add_mesh`] has kept.
+    pub meshes: Vec<(Vec<[f32; 3]>, Vec<[u32; 3]>)>,
+    /// Scenes by number.
+    pub scenes: Vec<Option<Bvh>>,
 }
 
 /// Makes a list of `count` equal items; `None` if the memory is full.

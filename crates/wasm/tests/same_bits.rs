@@ -23,7 +23,7 @@ fn scene() -> (Vec<f32>, Vec<Ray>) {
     for _ in 0..TRIANGLES {
         let centre = [random.next(), random.next(), random.next()];
         for item in 0..9 {
-            positions.push(centre[item % 3] + random.next() * 0.0625);
+            positions.push(centre[item % 3] + random.next() * 0.125);
         }
     }
     let mut triples = |offset: f32| -> Vec<[f32; 3]> {

@@ -16,7 +16,7 @@ export function soup(triangles, rays) {
         const centre = [next(), next(), next()];
         for (let item = 0; item < 9; ++item) {
             // Sums of two numbers of single precision, rounded once.
-            positions[9 * triangle + item] = centre[item % 3] + Math.fround(next() * 0.0625);
+            positions[9 * triangle + item] = centre[item % 3] + Math.fround(next() * 0.125);
         }
     }
     const origins = Float32Array.from({ length: 3 * rays }, next);
