@@ -56,6 +56,8 @@ pub enum ErrorCode {
 
 /// `RTC_SCENE_FLAG_DYNAMIC`.
 pub const SCENE_DYNAMIC: u32 = 1;
+/// `RTC_SCENE_FLAG_ROBUST`.
+pub const SCENE_ROBUST: u32 = 4;
 /// `RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER`.
 pub const INVOKE_ARGUMENT_FILTER: c_int = 1 << 1;
 

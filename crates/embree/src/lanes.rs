@@ -10,7 +10,7 @@ use crate::abi::{Arguments, Context, RAY_FIELDS, RtcHit, RtcRay};
 use crate::commit::Committed;
 use crate::failure::{Failure, Outcome};
 use crate::filter::Query;
-use crate::query::{Way, kernel_ray, start};
+use crate::query::{Way, start};
 use crate::scene::{Scene, with};
 
 /// One ray of many: its fields are so many numbers apart.
@@ -179,7 +179,7 @@ unsafe fn occluded_many<const N: usize>(
             if let Some(lane) = lanes.lane(index) {
                 let ray = lane.ray();
                 if committed.way(Query::Occluded, ray.mask, arguments) == Way::Plain {
-                    rays[pending] = kernel_ray(&ray);
+                    rays[pending] = committed.kernel_ray(&ray);
                     places[pending] = lane;
                     pending += 1;
                 } else if committed.occluded(&ray, arguments) {
@@ -239,7 +239,7 @@ unsafe fn intersect_many<const N: usize>(
             if let Some(lane) = lanes.lane(index) {
                 let ray = lane.ray();
                 if committed.way(Query::Intersect, ray.mask, arguments) == Way::Plain {
-                    rays[pending] = kernel_ray(&ray);
+                    rays[pending] = committed.kernel_ray(&ray);
                     places[pending] = lane;
                     pending += 1;
                 } else if let Some((t, hit)) = committed.intersect(&ray, arguments) {

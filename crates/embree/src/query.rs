@@ -15,16 +15,25 @@ use crate::scene::{Scene, with};
 use crate::transform;
 use crate::user::{Current, with_current};
 
-/// A ray as the kernel takes it: closed at both ends, and never before the origin, as with Embree.
+/// A ray as the kernel takes it, never before the origin. The far end is closed, and so is the near end if `is_closed` says so.
 #[inline]
-pub fn kernel_ray(ray: &RtcRay) -> Ray {
-    let mut kernel = Ray::new(ray.org, ray.dir);
-    kernel.tnear = if ray.tnear < 0.0 { 0.0 } else { ray.tnear };
-    kernel.tfar = ray.tfar;
-    kernel.closed()
+pub fn kernel_ray(ray: &RtcRay, is_closed: bool) -> Ray {
+    let tnear = if ray.tnear < 0.0 { 0.0 } else { ray.tnear };
+    let kernel = Ray {
+        org: ray.org,
+        tnear,
+        dir: ray.dir,
+        tfar: ray.tfar,
+    };
+    let closed = kernel.closed();
+    match is_closed {
+        true => closed,
+        // Rays before the origin do not go in packets of the kernel.
+        false => Ray { tnear, ..closed },
+    }
 }
 
-/// A distance inside the interval of a ray, which the kernel has widened by one number at each end.
+/// A distance inside the interval of a ray, whose closed ends the kernel has widened by one number.
 #[inline]
 fn inside(ray: &RtcRay, t: f32) -> f32 {
     t.max(if ray.tnear < 0.0 { 0.0 } else { ray.tnear })
@@ -43,6 +52,12 @@ pub enum Way {
 }
 
 impl Committed {
+    /// A ray with the ends that Embree has in this scene.
+    #[inline]
+    pub fn kernel_ray(&self, ray: &RtcRay) -> Ray {
+        kernel_ray(ray, self.traits.near_is_closed)
+    }
+
     /// How rays with this mask must be traced.
     #[inline]
     pub fn way(&self, query: Query, mask: u32, arguments: Option<&Arguments>) -> Way {
@@ -69,11 +84,11 @@ impl Committed {
     pub fn intersect(&self, ray: &RtcRay, arguments: Option<&Arguments>) -> Option<(f32, RtcHit)> {
         match self.way(Query::Intersect, ray.mask, arguments) {
             Way::Plain => {
-                let hit = self.bvh().intersect(&kernel_ray(ray))?;
+                let hit = self.bvh().intersect(&self.kernel_ray(ray))?;
                 Some(self.found(ray, &hit, None))
             }
             Way::Masked => {
-                let kernel = kernel_ray(ray);
+                let kernel = self.kernel_ray(ray);
                 let hit = (self.bvh().query(&kernel))
                     .mask(ray.mask)
                     .filter(&|hit| self.counts(ray.mask, hit))
@@ -87,9 +102,9 @@ impl Committed {
     /// Whether a ray is occluded.
     pub fn occluded(&self, ray: &RtcRay, arguments: Option<&Arguments>) -> bool {
         match self.way(Query::Occluded, ray.mask, arguments) {
-            Way::Plain => self.bvh().occluded(&kernel_ray(ray)),
+            Way::Plain => self.bvh().occluded(&self.kernel_ray(ray)),
             Way::Masked => {
-                let kernel = kernel_ray(ray);
+                let kernel = self.kernel_ray(ray);
                 (self.bvh().query(&kernel))
                     .mask(ray.mask)
                     .filter(&|hit| self.counts(ray.mask, hit))
@@ -119,7 +134,7 @@ impl Committed {
         };
         let mut accepted = None;
         let mut behind = FarSides::default();
-        let kernel = kernel_ray(ray);
+        let kernel = self.kernel_ray(ray);
         let decide = |hit: &Hit, accepted: &mut Option<(f32, RtcHit)>| {
             let place = self.find(hit.inst_id, hit.geom_id);
             let found = self.found(ray, hit, Some(&current));

@@ -27,7 +27,7 @@ void *rtcNewGeometry(void *, int); void rtcReleaseGeometry(void *); void rtcComm
 unsigned rtcAttachGeometry(void *, void *); void rtcAttachGeometryByID(void *, void *, unsigned); void rtcDetachGeometry(void *, unsigned);
 void *rtcSetNewGeometryBuffer(void *, int, unsigned, int, size_t, size_t);
 void rtcSetSharedGeometryBuffer(void *, int, unsigned, int, const void *, size_t, size_t, size_t);
-void rtcSetGeometryMask(void *, unsigned); void rtcDisableGeometry(void *);
+void rtcSetSceneFlags(void *, int); void rtcSetGeometryMask(void *, unsigned); void rtcDisableGeometry(void *);
 void rtcSetGeometryInstancedScene(void *, void *); void rtcSetGeometryTransform(void *, unsigned, int, const void *);
 void rtcSetGeometryIntersectFilterFunction(void *, void (*)(const FilterArgs *)); void rtcSetGeometryUserData(void *, void *);
 void rtcSetGeometryUserPrimitiveCount(void *, unsigned); void rtcSetGeometryBoundsFunction(void *, void (*)(const BoundsArgs *), void *);
@@ -104,6 +104,43 @@ static void packets_and_streams(void *device) {
     CHECK(memcmp(stream_hits, hits, sizeof hits) == 0);
     rtcReleaseGeometry(geometry);
     rtcReleaseScene(scene);
+}
+
+/* Hits at the ends: tnear < t <= tfar on triangles, tnear <= t <= tfar in robust scenes. Packets as single rays. */
+static void ends_of_intervals(void *device) {
+    for (int robust = 0; robust < 2; ++robust) {
+        void *scene = rtcNewScene(device), *geometry = rtcNewGeometry(device, 0);
+        float *positions = rtcSetNewGeometryBuffer(geometry, 1, 0, FLOAT3, 12, 3);
+        unsigned *indices = rtcSetNewGeometryBuffer(geometry, 0, 0, UINT3, 12, 1);
+        static const float corners[9] = {0, 0, 1, 4, 0, 1, 0, 4, 1};
+        static const float intervals[5][2] = {{0, 1}, {1, 2}, {0, 0.9999f}, {1.0001f, 2}, {-3, 2}};
+        const bool expected[5] = {true, robust, false, false, true};
+        memcpy(positions, corners, sizeof corners);
+        for (unsigned i = 0; i < 3; ++i) indices[i] = i;
+        rtcCommitGeometry(geometry);
+        rtcAttachGeometry(scene, geometry);
+        rtcSetSceneFlags(scene, robust ? 4 : 0);
+        rtcCommitScene(scene);
+        for (unsigned i = 0; i < 6; ++i) {
+            /* The last one starts on the triangle. */
+            RayHit hit = ray(1, 1, i == 5, 0, 0, 1);
+            bool is_hit = i == 5 ? robust : expected[i];
+            Ray16 packet;
+            _Alignas(64) int valid[16];
+            if (i < 5) hit.ray.tnear = intervals[i][0], hit.ray.tfar = intervals[i][1];
+            for (unsigned lane = 0; lane < 16; ++lane, valid[lane - 1] = -1)
+                for (unsigned field = 0; field < 12; ++field) memcpy(&packet.numbers[field][lane], hit.ray.org + field, 4);
+            rtcOccluded16(valid, scene, &packet, NULL);
+            for (unsigned lane = 0; lane < 16; ++lane) CHECK((packet.numbers[8][lane] == -INFINITY) == is_hit);
+            Ray single = hit.ray;
+            rtcOccluded1(scene, &single, NULL);
+            CHECK((single.tfar == -INFINITY) == is_hit);
+            rtcIntersect1(scene, &hit, NULL);
+            CHECK((hit.hit.geom == 0) == is_hit && (!is_hit || hit.ray.tfar == (i == 5 ? 0 : 1)));
+        }
+        rtcReleaseGeometry(geometry);
+        rtcReleaseScene(scene);
+    }
 }
 
 static unsigned calls;
@@ -246,6 +283,7 @@ int main(void) {
     void *device = rtcNewDevice("threads=2,isa=avx2");
     CHECK(device != NULL);
     packets_and_streams(device);
+    ends_of_intervals(device);
     masks_filters_instances(device);
     user_geometry_and_points(device);
     CHECK(rtcGetDeviceError(device) == 0);
