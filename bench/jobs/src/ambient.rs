@@ -1,6 +1,6 @@
 //! Ambient occlusion: directions around the normal of each point.
 
-use antumbra::{Bvh, Ray, Recipe};
+use antumbra::{Bvh, Ray};
 use antumbra_bake::{AmbientOcclusion, ambient_occlusion, ambient_rays};
 
 use crate::Outcome;
@@ -21,7 +21,7 @@ pub fn run(rtc: &Rtc, mesh: &Mesh, sensors: &Sensors, samples: u32) -> Outcome {
     let compared = compare(rtc, mesh, ours, &CALLS, |call, share| {
         embree(rtc, mesh, sensors, samples, call, share)
     });
-    let expected = same_rays(rtc, &crate::build(mesh, &Recipe::default()), sensors, &options);
+    let expected = same_rays(rtc, &crate::build(mesh), sensors, &options);
     let differ = compared
         .ours
         .iter()

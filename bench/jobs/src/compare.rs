@@ -3,7 +3,7 @@
 use std::cell::RefCell;
 use std::fmt;
 
-use antumbra::{Bvh, Recipe};
+use antumbra::Bvh;
 
 use crate::input::Mesh;
 use crate::rtc::Rtc;
@@ -45,14 +45,15 @@ pub fn compare<T, W: Copy>(
     ways: &Ways<W>,
     embree: impl Fn(W, usize) -> T,
 ) -> Compared<T> {
-    compare_on(rtc, (mesh, &Recipe::default()), ours, ways, embree)
+    compare_with(rtc, mesh, || crate::build(mesh), ours, ways, embree)
 }
 
-/// [`compare`], with our trees by a recipe.
-pub fn compare_on<T, W: Copy>(
+/// [`compare`], where ours builds something else than a tree.
+pub fn compare_with<B, T, W: Copy>(
     rtc: &Rtc,
-    (mesh, recipe): (&Mesh, &Recipe),
-    ours: impl Fn(&Bvh) -> T,
+    mesh: &Mesh,
+    build: impl Fn() -> B,
+    ours: impl Fn(&B) -> T,
     ways: &Ways<W>,
     embree: impl Fn(W, usize) -> T,
 ) -> Compared<T> {
@@ -81,9 +82,9 @@ pub fn compare_on<T, W: Copy>(
             "ours".into(),
             Box::new(|| {
                 let start = seconds();
-                let bvh = crate::build(mesh, recipe);
+                let built = build();
                 builds[0].borrow_mut().push(seconds() - start);
-                *results[0].borrow_mut() = Some(ours(&bvh));
+                *results[0].borrow_mut() = Some(ours(&built));
             }),
         ),
         (

@@ -3,7 +3,7 @@
 //!     bench/get-embree
 //!     ANTUMBRA_SCENES=FOLDER cargo run --release --manifest-path bench/jobs/Cargo.toml -- bench/embree/LIBRARY [JOB...]
 //!
-//! Ours calls the crates as a user would, with default trees, or fast ones where rays are fewer than triangles. Embree's program is the best that we can write with few lines: it sorts points and
+//! Ours calls the crates as a user would. Embree's program is the best that we can write with few lines: it sorts points and
 //! directions, and uses single calls or packets of 16, whichever a trial on an eighth of the job finds faster. Both are functions
 //! of one file, `ours` and `embree`.
 //!
@@ -138,15 +138,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Our tree of a mesh.
-fn build(mesh: &Mesh, recipe: &Recipe) -> Bvh {
+/// Our tree of a mesh, by default.
+fn build(mesh: &Mesh) -> Bvh {
     let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
-    Bvh::build(&geometry, recipe).expect("a mesh of finite triangles")
+    Bvh::build(&geometry, &Recipe::default()).expect("a mesh of finite triangles")
 }
 
 /// Sensors where rays from above meet the floor of a hall.
 fn floor(mesh: &Mesh) -> Result<Sensors, Box<dyn std::error::Error>> {
-    let bvh = build(mesh, &Recipe::default());
+    let bvh = build(mesh);
     let bounds = bvh.bounds();
     let size = [0, 1, 2].map(|axis| bounds.max[axis] - bounds.min[axis]);
     let at = |axis: usize, part: f32| bounds.min[axis] + part * size[axis];

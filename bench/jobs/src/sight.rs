@@ -1,10 +1,10 @@
-//! Visibility between points, and of a terrain from one point.
+//! Visibility between points, and of a terrain from one point. Ours does the second without a mesh or a tree.
 
 use antumbra::{Bvh, Ray, Recipe};
-use antumbra_bake::{sees_each_other, sees_points};
+use antumbra_bake::{HeightField, Observer, ViewshedJob, sees_each_other};
 
 use crate::Outcome;
-use crate::compare::{compare, compare_on};
+use crate::compare::{compare, compare_with};
 use crate::input::{Mesh, along_curve, dot, less, origin_offset};
 use crate::rtc::{CALLS, Rtc};
 
@@ -61,9 +61,33 @@ pub fn viewshed(rtc: &Rtc, side: u32) -> Outcome {
         .max_by(|a, b| mesh.positions[*a as usize][2].total_cmp(&mesh.positions[*b as usize][2]));
     let [x, y, z] = mesh.positions[hill.ok_or("a terrain of no points")? as usize];
     let tower = [x + 1.0, y + 2.0, z + 30.0];
-    let ours = |bvh: &Bvh| {
-        let seen = sees_points(bvh, &[tower], &targets, None, &());
-        seen.expect("memory for a row").into_words()
+    let heights: Vec<f64> = (mesh.positions.iter())
+        .map(|position| f64::from(position[2]))
+        .collect();
+    // Vertices are the centres of cells.
+    let transform = [-5.0, 10.0, 0.0, -5.0, 0.0, 10.0];
+    let field = || HeightField::new([side as usize; 2], &heights, transform).expect("cells");
+    let ours = |field: &HeightField<'_>| {
+        let [x, y, height] = tower.map(f64::from);
+        let observers = [Observer {
+            place: field.place([x, y]),
+            height,
+            normal: [0.0; 3],
+        }];
+        let job = ViewshedJob {
+            field,
+            observers: &observers,
+            target: 1.0,
+            drop: 0.0,
+            range: f64::INFINITY,
+        };
+        let nothing = Bvh::build(&[], &Recipe::default()).expect("an empty tree");
+        let found = antumbra_bake::run(&job, &nothing, &()).expect("memory for runs");
+        let mut seen = vec![0u64; heights.len().div_ceil(64)];
+        for cell in found.seen(0).flatten() {
+            seen[cell / 64] |= 1 << (cell % 64);
+        }
+        seen
     };
     let embree = |call, share: usize| {
         let offset = origin_offset(&mesh, &targets);
@@ -76,7 +100,7 @@ pub fn viewshed(rtc: &Rtc, side: u32) -> Outcome {
         );
         seen
     };
-    let compared = compare_on(rtc, (&mesh, &Recipe::fast()), ours, &CALLS, embree);
+    let compared = compare_with(rtc, &mesh, field, ours, &CALLS, embree);
     let differ = different_bits(&compared.ours, &compared.embree);
     Ok(compared.row(targets.len() as u64, targets.len(), differ))
 }

@@ -105,7 +105,7 @@ impl NestedInstances {
         &self.instances
     }
 
-    /// Way to an instance, from the world inwards: places in the list of the world, then in those of the objects.
+    /// Way to an instance, from the world inwards: places in the list of the world, then in the lists of the objects.
     ///
     /// # Panics
     /// If there is no such instance.
@@ -121,7 +121,7 @@ impl NestedInstances {
     }
 }
 
-/// Lists of instances, that of the world named [`INVALID_ID`].
+/// Lists of instances: the list of the world has the name [`INVALID_ID`].
 struct Lists<'a, L> {
     world: &'a [Instance],
     inside: &'a [L],
