@@ -29,9 +29,12 @@ named_list! {
         BinnedSah = "binned-sah",
             "Object splits between bins by the surface area heuristic: the fastest to build",
             Some("Wald 2007"), Properties::PLAIN;
-        BinnedSah4 if "lab" = "binned-sah-4",
-            "As `binned-sah`, with at most 4 primitives in a leaf as in pbrt-v3: for comparisons of counts",
-            Some("Wald 2007"), Properties::PLAIN;
+        Pbrt if "lab" = "pbrt",
+            "Object splits over 12 buckets, leaves of at most 4 and only where cheaper, as in pbrt-v3",
+            Some("Pharr, Jakob and Humphreys 2016"), Properties::PLAIN;
+        Pbrt2015 if "lab" = "pbrt-2015",
+            "As `pbrt`, with one primitive in a leaf, as in pbrt-v3 until November 2015",
+            Some("Pharr, Jakob and Humphreys 2016"), Properties::PLAIN;
         #[default]
         Reinsertion = "reinsertion",
             "Binned SAH, then subtrees moved to better places",

@@ -3,7 +3,7 @@
 use super::ray_driven::evidence::{AllEvidence, Evidence};
 use super::ray_driven::rdh::Rdh;
 use super::ray_driven::srdh::Srdh;
-use super::{leaf_size, ploc, ray_driven, sbvh};
+use super::{pbrt, ploc, ray_driven, sbvh};
 use crate::builder::{Builder, binned_sah};
 use crate::geometry::primitives::Primitives;
 use crate::ray::Ray;
@@ -37,9 +37,8 @@ impl TrainingHits {
             Builder::Sbvh => sbvh::build(primitives),
             Builder::Rdh => ray_driven::build(primitives, hits, &Rdh::new()),
             Builder::Srdh => ray_driven::build(primitives, hits, &Srdh::new()),
-            Builder::BinnedSah4 => {
-                leaf_size::with_leaves_of(primitives, &binned_sah::build(primitives), 4)
-            }
+            Builder::Pbrt => pbrt::build(primitives, pbrt::Rule::LATER),
+            Builder::Pbrt2015 => pbrt::build(primitives, pbrt::Rule::EARLIER),
             Builder::BinnedSah | Builder::Reinsertion => binned_sah::build(primitives),
         }
     }

@@ -28,7 +28,7 @@
 //! - `laboratory`: the steps of learning, and queries that count;  `oracle`: a bound for every order
 //! - `orders`: child orders of the laboratory: `random`, `rtsah`, `exclusive`, and those that look at the ray (`by_ray`,
 //!   `ways`)
-//! - `builders`: builders of the laboratory: `ploc`, `sbvh`, `ray_driven`, `leaf_size`;
+//! - `builders`: builders of the laboratory: `ploc`, `sbvh`, `ray_driven`, `pbrt`;
 //!   `pieces` and `candidates` serve them
 //! - `rsc`: a collapse by visits
 //! - `saved`: orders and logs in files;  `steps`: single steps of a traversal, for benches
@@ -38,9 +38,9 @@ pub(crate) mod by_ray;
 pub(crate) mod candidates;
 pub(crate) mod exclusive;
 mod laboratory;
-mod leaf_size;
 mod oracle;
 pub(crate) mod orders;
+mod pbrt;
 pub(crate) mod pieces;
 pub(crate) mod ploc;
 mod random;

@@ -103,7 +103,7 @@ fn small_leaves_hold_everything() {
         bvh.validate().expect("sound");
         bvh
     };
-    let (large, small) = (build(Builder::BinnedSah), build(Builder::BinnedSah4));
+    let (large, small) = (build(Builder::BinnedSah), build(Builder::Pbrt));
     assert_eq!(answers(&large, &rays), answers(&small, &rays));
     let most = |bvh: &Bvh| {
         // A ray that meets one leaf tests at most as many primitives as leaves times their size.
