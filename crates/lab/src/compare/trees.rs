@@ -48,8 +48,13 @@ pub struct Ready {
     pub learns: bool,
 }
 
-/// What decides a first tree.
-type Shape = (Builder, Collapse, Width);
+/// What decides a first tree: builder, collapse, width, and the bits of what a primitive test costs.
+type Shape = (Builder, Collapse, Width, u32);
+
+fn shape(builder: Builder, recipe: &Recipe) -> Shape {
+    let cost = recipe.costs.prim.to_bits();
+    (builder, recipe.collapse, recipe.width, cost)
+}
 
 /// A first tree.
 pub struct First {
@@ -200,7 +205,7 @@ impl Maker {
     /// Place of the first tree of a recipe.
     pub fn first(&mut self, session: &Session, recipe: &Recipe) -> Result<usize, Error> {
         let builder = Session::first_builder(recipe);
-        let shape = (builder, recipe.collapse, recipe.width);
+        let shape = shape(builder, recipe);
         if let Some(place) = self.firsts.iter().position(|first| first.shape == shape) {
             return Ok(place);
         }
@@ -243,7 +248,7 @@ impl Maker {
             log_busy = seconds;
             logging = (!training.rays.is_empty()).then_some(tests);
             if anew {
-                let shape = (recipe.builder, recipe.collapse, recipe.width);
+                let shape = shape(recipe.builder, recipe);
                 match &self.anew {
                     Some((of, made)) if *of == shape => {
                         bvh = made.clone();

@@ -112,15 +112,88 @@ pub fn words(kind: Kind) -> &'static str {
     }
 }
 
-/// A line whose best value is marked.
-pub fn marked_line(name: String, values: &[Option<f64>], decimals: usize, most: bool) -> Line {
-    let better = |a: f64, b: f64| if most { a.max(b) } else { a.min(b) };
-    let best = values.iter().flatten().copied().reduce(better);
-    // What is printed alike is equally good.
+/// A figure with the least and the most of its repetitions, which are equal for counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Measured {
+    pub value: f64,
+    pub range: [f64; 2],
+}
+
+impl Measured {
+    /// A count, which has no spread.
+    pub fn exact(value: f64) -> Self {
+        Self {
+            value,
+            range: [value; 2],
+        }
+    }
+
+    /// Whether all repetitions of this are better than all of the other.
+    pub fn beats(&self, other: &Self, most: bool) -> bool {
+        match most {
+            true => self.range[0] > other.range[1],
+            false => self.range[1] < other.range[0],
+        }
+    }
+}
+
+/// A line of figures that are not marked.
+pub fn plain_line(name: String, values: &[Option<f64>], decimals: usize) -> Line {
+    let cell = |value: &Option<f64>| Cell::number(*value, decimals);
+    Line::new(name, values.iter().map(cell).collect())
+}
+
+/// A line in which the best figure is marked, with all that are printed alike or whose spread overlaps its own. Nothing is
+/// marked unless the best one beats another beyond their spread.
+pub fn marked_line(name: String, values: &[Option<Measured>], decimals: usize, most: bool) -> Line {
+    let better = |a: Measured, b: Measured| match (b.value > a.value) == most {
+        true if b.value != a.value => b,
+        _ => a,
+    };
     let text = |value: Option<f64>| number(value, decimals);
-    let cell = |value: &Option<f64>| Cell {
-        best: value.is_some() && text(*value) == text(best) && values.len() > 1,
-        ..Cell::plain(text(*value))
+    let best = values.iter().flatten().copied().reduce(better);
+    let beaten = |one: &Measured| {
+        best.is_some_and(|best| {
+            best.beats(one, most) && text(Some(best.value)) != text(Some(one.value))
+        })
+    };
+    let any = values.iter().flatten().any(beaten);
+    let cell = |value: &Option<Measured>| Cell {
+        best: any && value.as_ref().is_some_and(|one| !beaten(one)),
+        ..Cell::plain(text(value.map(|one| one.value)))
     };
     Line::new(name, values.iter().map(cell).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn marks(values: &[Option<Measured>], decimals: usize, most: bool) -> Vec<bool> {
+        let line = marked_line(String::new(), values, decimals, most);
+        line.cells.iter().map(|cell| cell.best).collect()
+    }
+
+    #[test]
+    fn marks_are_where_a_difference_is_beyond_its_spread() {
+        let exact = |value| Some(Measured::exact(value));
+        assert_eq!(marks(&[exact(2.0), exact(1.0), None], 2, false), [false, true, false]);
+        assert_eq!(marks(&[exact(2.0), exact(1.0)], 2, true), [true, false]);
+        // What is printed alike is equally good, and nothing is best of equals.
+        let three = [exact(1.001), exact(1.002), exact(3.0)];
+        assert_eq!(marks(&three, 2, false), [true, true, false]);
+        assert_eq!(marks(&[exact(1.001), exact(1.002)], 2, false), [false, false]);
+        assert_eq!(marks(&[exact(1.0)], 2, false), [false]);
+        // Times: the fastest median is not the best where the rounds overlap.
+        let time = |value, low, high| {
+            Some(Measured {
+                value,
+                range: [low, high],
+            })
+        };
+        let close = [time(1.0, 0.9, 1.2), time(1.1, 1.0, 1.3)];
+        assert_eq!(marks(&close, 2, false), [false, false]);
+        let apart = [close[0], close[1], time(1.5, 1.4, 1.6)];
+        assert_eq!(marks(&apart, 2, false), [true, true, false]);
+    }
 }

@@ -27,36 +27,43 @@ use crate::study::{By, Kind, Part, Plan, Results, Row};
 use crate::table::{Table, count, number};
 use crate::{Error, Machine};
 
-const HEADER: [&str; 12] = [
+const HEADER: [&str; 17] = [
     "order",
-    "nodes before",
-    "nodes after",
-    "prims before",
-    "prims after",
+    "C_p",
+    "N_b before",
+    "N_b after",
+    "N_b gain",
+    "N_t before",
+    "N_t after",
+    "N_t gain",
+    "N_b unsorted",
+    "N_t unsorted",
     "log s",
     "sort ms",
     "shadow s",
     "composed s",
     "spread",
     "vs simple",
-    "paper: nodes after",
+    "top N_b after",
 ];
 
 const BEST: [&str; 9] = [
-    "tree", "collapse", "order", "cost", "nodes", "prims", "occluded", "Mray/s", "speed",
+    "tree", "collapse", "order", "speed", "rounds", "cost", "N_b", "N_t", "occluded",
 ];
 
 const LEGEND: &str = "\
-nodes, prims: box tests of a node's children at once, and primitive tests, per shadow ray that was not learned from; \
-before: unsorted, after: in its order. All trees of a scene meet the same rays.
-log: seconds to learn the order; sort: milliseconds of sorting alone; shadow: seconds in shadow rays, summed over the \
-threads; composed: seconds of a whole picture, from the tree's own queries and learning and from the shading that all \
-trees share; spread: most over least of the rounds; vs simple: speed of the composed picture, order simple being 1; \
-paper: the same scene, or the one it stands in for.";
+N_b: node tests, all boxes of a node at once; N_t: primitive tests; both are means per shadow ray. Before: training rays \
+while they are logged, as in the paper; after: held-out rays, the same for all trees of a scene; unsorted: held-out rays \
+before the children are ordered; gain: after with order simple over after; top: N_b outside of instances, as the paper \
+counts sanmiguel. In the CSV and JSON files N_b is node_tests and N_t is prim_tests.
+C_p: cost of a primitive test by which the order was learned; log: seconds to learn the order; sort: milliseconds of \
+sorting only; shadow: seconds in shadow rays, summed over the threads; composed: seconds of a whole picture, from the \
+tree's own queries and learning and from the shading that all trees share, without building the first tree; spread: most \
+over least of the rounds; vs simple: speed of the composed picture, order simple being 1.";
 
 const REPLAY_LEGEND: &str = "\
-Replays: a sample of rays, none of them learned from; occluded: node tests of the rays that meet something; speed: \
-relative to order simple on the default tree collapsed by area, one thread.";
+Replays: a sample of held-out rays; occluded: N_b of the occluded rays; speed: relative to order simple on the default \
+tree collapsed by area, one thread, median of interleaved rounds; rounds: least and most of them.";
 
 /// How many of the best combinations are listed for people.
 const MOST_BEST: usize = 10;
@@ -78,6 +85,7 @@ fn tables(plan: &Plan, rows: &[&Row]) -> Vec<Table> {
             let orders: Vec<&Row> = run.iter().filter(first).copied().collect();
             let others: Vec<&Row> = run.iter().filter(|row| !first(row)).copied().collect();
             tables.extend(of_orders(&orders));
+            tables.extend(of_the_paper(&orders));
             tables.extend(of_trees(&others));
             tables.extend(of_measured(&run));
         }
@@ -128,7 +136,7 @@ impl Results<'_> {
         };
         let document = self.document();
         let mut text = format!(
-            "# Visiting orders of shadow rays\n\n{}; antumbra {}, seed {}.\n",
+            "# Child orders of shadow rays\n\n{}; antumbra {}, seed {}.\n",
             document.machine.describe(),
             document.machine.version,
             document.seed
@@ -156,40 +164,93 @@ impl Results<'_> {
 fn of_orders(rows: &[&Row]) -> Option<Table> {
     let reference = rows.iter().find(|row| row.order == Order::Simple.name());
     let first = rows.first()?;
-    let simple = reference.and_then(|row| row.render_seconds);
     // What a faster shadow ray can bring at most (Amdahl) is told with every time.
     let busy = reference.unwrap_or(first).busy_seconds;
     let share = busy.map_or(0.0, |busy| 100.0 * busy.shadow / busy.busy());
     let caption = format!(
-        "{}: {} triangles, width {}, collapse {}, {} spp, {} shadow rays ({:.0} % of all rays, {share:.0} % of the time)",
+        "{}: {} triangles, width {}, tree {}, collapse {}, {} spp, {} shadow rays ({:.0} % of all rays, {share:.0} % of the time)",
         first.scene,
         count(first.triangles as u64),
         first.width,
+        first.tree,
         first.collapse,
         first.spp,
         count(first.shadow_rays.unwrap_or(0)),
         100.0 * first.shadow_share.unwrap_or(0.0),
     );
+    let columns = match first.top_node_tests_after {
+        Some(_) => HEADER.len(),
+        None => HEADER.len() - 1,
+    };
     Some(Table {
         caption,
-        header: HEADER.to_vec(),
-        rows: rows
-            .iter()
-            .map(|row| line(row, row.order.clone(), simple))
+        header: HEADER[..columns].to_vec(),
+        rows: (rows.iter())
+            .map(|row| {
+                let mut cells = line(row, reference.copied());
+                cells.truncate(columns);
+                cells
+            })
             .collect(),
+    })
+}
+
+/// The same scene in the paper, or the one that ours stands in for.
+fn of_the_paper(rows: &[&Row]) -> Option<Table> {
+    const PAPER: [&str; 10] = [
+        "order",
+        "N_b before",
+        "N_b after",
+        "N_b gain",
+        "N_t before",
+        "N_t after",
+        "N_t gain",
+        "log s",
+        "sort ms",
+        "rendering s",
+    ];
+    let first = rows.first()?;
+    let theirs = paper::counterpart(&first.scene)?;
+    let lines = paper::lines(&first.scene, first.width);
+    let simple = lines.iter().find(|line| line.technique == "Simple")?;
+    let relation = match theirs.same {
+        true => format!("{} in the paper", theirs.name),
+        false => format!("{} in the paper, for which {} stands in", theirs.name, first.scene),
+    };
+    let cells = |line: &paper::Figures| {
+        vec![
+            line.technique.to_lowercase(),
+            number(line.n_b_before(), 2),
+            number(Some(line.n_b_after()), 2),
+            number(Some(simple.n_b_after() / line.n_b_after()), 2),
+            number(line.n_t_before(), 2),
+            number(Some(line.n_t_after()), 2),
+            number(Some(simple.n_t_after() / line.n_t_after()), 2),
+            number(line.logging_s, 1),
+            number(line.sorting_ms, 0),
+            number(Some(line.total_render_s), 0),
+        ]
+    };
+    Some(Table {
+        caption: format!("{relation}, width {}", first.width),
+        header: PAPER.to_vec(),
+        rows: lines.iter().map(cells).collect(),
     })
 }
 
 /// Other trees and collapses by one order, if any was rendered.
 fn of_trees(rows: &[&Row]) -> Option<Table> {
-    const TREES: [&str; 11] = [
+    const TREES: [&str; 14] = [
         "tree and collapse",
-        "nodes before",
-        "nodes after",
-        "prims before",
-        "prims after",
+        "N_b before",
+        "N_b after",
+        "N_t before",
+        "N_t after",
+        "N_b unsorted",
+        "N_t unsorted",
         "log s",
         "sort ms",
+        "remake s",
         "shadow s",
         "composed s",
         "spread",
@@ -197,10 +258,22 @@ fn of_trees(rows: &[&Row]) -> Option<Table> {
     ];
     let first = rows.first()?;
     let cells = rows.iter().map(|row| {
-        let mut cells = line(row, format!("{} {}", row.tree, row.collapse), None);
-        cells.truncate(10);
-        cells.push(number(Some(row.build_seconds), 3));
-        cells
+        vec![
+            format!("{} {}", row.tree, row.collapse),
+            number(row.node_tests_before, 3),
+            number(row.node_tests_after, 3),
+            number(row.prim_tests_before, 3),
+            number(row.prim_tests_after, 3),
+            number(row.node_tests_unsorted, 3),
+            number(row.prim_tests_unsorted, 3),
+            number(learned(row, row.log_seconds), 3),
+            number(learned(row, 1e3 * row.sort_seconds), 1),
+            number(row.remake_seconds, 3),
+            number(row.busy_seconds.map(|busy| busy.shadow), 2),
+            number(row.render_seconds, 2),
+            number(row.spread(), 2),
+            number(Some(row.build_seconds), 3),
+        ]
     });
     Some(Table {
         caption: format!(
@@ -252,27 +325,29 @@ fn of_measured(rows: &[&Row]) -> Option<Table> {
 /// The best of many combinations.
 fn of_best(plan: &Plan, mut rows: Vec<&Row>) -> Table {
     let caption = format!(
-        "{}: {} rays, {} replayed; the cheapest of {} combinations",
+        "{}: {} rays, {} replayed; the fastest of {} combinations",
         rows[0].scene,
         rows[0].rays.name(),
         count(rows[0].test_rays),
         rows.len()
     );
     let cost = |row: &Row| row.cost(&plan.costs);
-    let rank = |row: &Row| cost(row).unwrap_or(f64::INFINITY);
-    rows.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
+    let rank = |row: &Row| row.speed.unwrap_or(0.0);
+    rows.sort_by(|a, b| rank(b).total_cmp(&rank(a)));
     rows.truncate(MOST_BEST);
     let cells = rows.iter().map(|row| {
         vec![
             row.tree.clone(),
             row.collapse.clone(),
             format!("{} {}", row.order, row.width),
+            number(row.speed, 2),
+            row.speed_range.map_or_else(String::new, |[least, most]| {
+                format!("{least:.2} to {most:.2}")
+            }),
             number(cost(row), 3),
             number(row.node_tests_after, 3),
             number(row.prim_tests_after, 3),
             number(row.node_tests_occluded, 3),
-            number(row.mrays_per_s, 2),
-            number(row.speed, 2),
         ]
     });
     Table {
@@ -282,26 +357,34 @@ fn of_best(plan: &Plan, mut rows: Vec<&Row>) -> Table {
     }
 }
 
-/// The figures of a rendering.
-fn line(row: &Row, name: String, simple: Option<f64>) -> Vec<String> {
-    let learned = row.log_rays > 0;
-    let theirs = paper::node_tests(&row.scene, row.width, &row.order);
-    let seconds = |value: f64| number(learned.then_some(value), 3);
-    let speed = simple
-        .zip(row.render_seconds)
-        .map(|(simple, own)| simple / own);
+/// A figure of learning; `None` where nothing was learned.
+fn learned(row: &Row, value: f64) -> Option<f64> {
+    (row.log_rays > 0).then_some(value)
+}
+
+/// The figures of a rendering, beside the unsorted one.
+fn line(row: &Row, simple: Option<&Row>) -> Vec<String> {
+    let gain = |figure: fn(&Row) -> Option<f64>| {
+        let pair = simple.and_then(figure).zip(figure(row));
+        number(pair.map(|(simple, own)| simple / own), 2)
+    };
     vec![
-        name,
-        number(row.node_tests_before, 3),
-        number(row.node_tests_after, 3),
-        number(row.prim_tests_before, 3),
-        number(row.prim_tests_after, 3),
-        seconds(row.log_seconds),
-        number(learned.then_some(1e3 * row.order_seconds), 1),
+        row.order.clone(),
+        number(learned(row, row.prim_cost), 2),
+        number(row.node_tests_before, 2),
+        number(row.node_tests_after, 2),
+        gain(|row| row.node_tests_after),
+        number(row.prim_tests_before, 2),
+        number(row.prim_tests_after, 2),
+        gain(|row| row.prim_tests_after),
+        number(row.node_tests_unsorted, 2),
+        number(row.prim_tests_unsorted, 2),
+        number(learned(row, row.log_seconds), 3),
+        number(learned(row, 1e3 * row.sort_seconds), 1),
         number(row.busy_seconds.map(|busy| busy.shadow), 2),
         number(row.render_seconds, 2),
         number(row.spread(), 2),
-        number(speed, 3),
-        number(theirs, 2),
+        gain(|row| row.render_seconds),
+        number(row.top_node_tests_after, 2),
     ]
 }

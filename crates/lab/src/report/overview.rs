@@ -2,7 +2,7 @@
 
 use antumbra::recipe::{Collapse, Order};
 
-use super::blocks::{Block, Cell, Line, marked_line, words};
+use super::blocks::{Block, Cell, Line, Measured, marked_line, words};
 use super::charts::Stacks;
 use super::paper;
 use super::summary::Summary;
@@ -54,19 +54,22 @@ fn orders_block(plan: &Plan, summary: &Summary) -> Option<Block> {
                     tree,
                     collapse,
                     order: *order,
+                    prim_cost: None,
                 };
                 summary.gain(kind, &combination)
             };
             let gains: Vec<Option<f64>> = plan.orders.iter().map(gain).collect();
             if gains.iter().any(Option::is_some) {
                 let name = format!("{}, {width} wide", words(kind));
+                let gains: Vec<_> = gains.iter().map(|gain| gain.map(Measured::exact)).collect();
                 lines.push(marked_line(name, &gains, 3, true));
             }
         }
     }
     (!lines.is_empty()).then(|| Block::table("Orders", format!(
-            "Times fewer node tests per ray than {}: geometric mean of the scenes; tree {tree}, collapse {collapse}.",
-            summary.reference_words
+            "Times fewer node tests per ray than {}: geometric mean of the scenes; tree {tree}, collapse {collapse}.{}",
+            summary.reference_words,
+            summary.over_free_orders().map_or_else(String::new, |sentence| format!(" {sentence}"))
         ), plan.orders.iter(), lines).wide())
 }
 
@@ -87,6 +90,7 @@ fn trees_block(plan: &Plan, summary: &Summary, kind: Kind) -> Option<Block> {
                         tree,
                         collapse: *collapse,
                         order,
+                        prim_cost: None,
                     },
                 )
             };
@@ -179,11 +183,13 @@ fn times_block(plan: &Plan, rows: &[&Row]) -> Result<Option<Block>, Error> {
         if let Some(busy) = row.busy_seconds
             && row.is_on(tree.name(), collapse.name())
             && shown.contains(&&*row.order)
+            && row.prim_cost == f64::from(plan.costs.prim)
         {
             let name = format!("{}, {} wide, {}", row.scene, row.width, row.order);
-            let named = busy.named();
-            parts = named.iter().map(|(name, _)| (*name).to_owned()).collect();
-            lines.push((name, named.iter().map(|(_, seconds)| *seconds).collect()));
+            // Building is no part of a composed time.
+            let named = || busy.named().into_iter().filter(|(part, _)| *part != "build");
+            parts = named().map(|(part, _)| part.to_owned()).collect();
+            lines.push((name, named().map(|(_, seconds)| seconds).collect()));
         }
     }
     if lines.is_empty() {
@@ -196,7 +202,7 @@ fn times_block(plan: &Plan, rows: &[&Row]) -> Result<Option<Block>, Error> {
     };
     Ok(Some(Block::plot(
         "Where the time of a picture goes",
-        "Composed: shading and film are measured once for all trees of a picture. Counting the tests is no part of it.",
+        "Parts of the composed time, summed over the threads; shading and film are measured once for all trees of a picture. The part \"sort\" includes making a tree again for its training rays.",
         stacks.draw()?,
     )))
 }

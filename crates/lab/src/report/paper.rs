@@ -34,7 +34,7 @@ const SHARES: [(&str, f64); 6] = [
 pub struct Figures {
     scene: String,
     width: usize,
-    technique: String,
+    pub technique: String,
     pub box_tests_before: f64,
     pub prim_tests_before: f64,
     pub box_tests_after: Option<f64>,
@@ -76,14 +76,14 @@ pub fn tables() -> Result<Vec<Figures>, Error> {
     lines.map_err(Error::report)
 }
 
-/// Box tests per shadow ray after sorting, in the scene of the paper that ours is or stands in for.
-pub fn node_tests(scene: &str, width: usize, order: &str) -> Option<f64> {
-    let theirs = counterpart(scene)?;
-    let lines = tables().ok()?;
-    let found = lines
-        .iter()
-        .find(|line| line.is_of(theirs.name, width, order))?;
-    Some(found.box_tests_after.unwrap_or(found.box_tests_before))
+/// Lines of the paper about the scene that ours is or stands in for, in the order of its tables.
+pub fn lines(scene: &str, width: usize) -> Vec<Figures> {
+    let Some(theirs) = counterpart(scene) else {
+        return Vec::new();
+    };
+    let all = tables().unwrap_or_default().into_iter();
+    all.filter(|line| (&*line.scene, line.width) == (theirs.name, width))
+        .collect()
 }
 
 /// How a scene, and what was done with it, differ from the paper.
@@ -123,6 +123,26 @@ pub fn differences(scene: &str) -> Option<&'static str> {
 }
 
 impl Figures {
+    /// Node tests of the training rays; `None` for an order that learns nothing.
+    pub fn n_b_before(&self) -> Option<f64> {
+        self.box_tests_after.map(|_| self.box_tests_before)
+    }
+
+    /// Primitive tests of the training rays; `None` for an order that learns nothing.
+    pub fn n_t_before(&self) -> Option<f64> {
+        self.prim_tests_after.map(|_| self.prim_tests_before)
+    }
+
+    /// Node tests in the order. The paper has the only figure of an order that learns nothing under "before".
+    pub fn n_b_after(&self) -> f64 {
+        self.box_tests_after.unwrap_or(self.box_tests_before)
+    }
+
+    /// Primitive tests in the order.
+    pub fn n_t_after(&self) -> f64 {
+        self.prim_tests_after.unwrap_or(self.prim_tests_before)
+    }
+
     /// Whether the line is about this scene of the paper, width and order.
     pub fn is_of(&self, scene: &str, width: usize, order: &str) -> bool {
         let technique = match order {

@@ -5,7 +5,7 @@ use std::path::Path;
 use antumbra::recipe::Order;
 use serde::Serialize;
 
-use super::blocks::{Block, Cell, Line, marked_line};
+use super::blocks::{Block, Cell, Line, Measured, marked_line, plain_line};
 use super::paper::{self, Figures};
 use super::pictures::{Comparison, Embedded, Maps};
 use crate::Error;
@@ -57,6 +57,7 @@ pub fn wipe(
                 && row.width == c.width.lanes()
                 && row.is_on(c.tree.name(), c.collapse.name())
                 && row.order == c.order.name()
+                && row.prim_cost == f64::from(c.prim_cost.unwrap_or(plan.costs.prim))
         })
     };
     let all = plan.rendered(width);
@@ -121,6 +122,15 @@ pub fn wipe(
     }))
 }
 
+/// The order of a row, with C_p where the study has several.
+pub fn order_name(plan: &Plan, row: &Row) -> String {
+    let learns = row.order.parse().is_ok_and(Order::learns);
+    match plan.more_prim_costs.is_empty() || !learns {
+        true => row.order.clone(),
+        false => format!("{}, C_p {}", row.order, row.prim_cost),
+    }
+}
+
 /// Cells of text.
 fn plain(rows: &[&Row], text: impl Fn(&Row) -> Option<String>) -> Vec<Cell> {
     let text = |row: &&Row| text(row).unwrap_or_else(|| "-".to_owned());
@@ -138,23 +148,44 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
         .collect();
     let first = own.first()?;
     let learned = |row: &Row, value: f64| (row.log_rays > 0).then_some(value);
-    let line = |name: &str, decimals, value: &dyn Fn(&Row) -> Option<f64>| {
+    let plain_of = |name: &str, decimals, value: &dyn Fn(&Row) -> Option<f64>| {
         let values: Vec<Option<f64>> = own.iter().map(|row| value(row)).collect();
-        marked_line(name.to_owned(), &values, decimals, false)
+        plain_line(name.to_owned(), &values, decimals)
+    };
+    let marked = |name: &str, value: &dyn Fn(&Row) -> Option<Measured>| {
+        let values: Vec<Option<Measured>> = own.iter().map(|row| value(row)).collect();
+        marked_line(name.to_owned(), &values, 2, false)
     };
     let mut lines = vec![
-        line("node tests while logging", 2, &|row| row.node_tests_logging),
-        line("prim tests while logging", 2, &|row| row.prim_tests_logging),
-        line("node tests before", 2, &|row| row.node_tests_before),
-        line("prim tests before", 2, &|row| row.prim_tests_before),
-        line("node tests after", 2, &|row| row.node_tests_after),
-        line("prim tests after", 2, &|row| row.prim_tests_after),
-        line("logging, s", 2, &|row| learned(row, row.log_seconds)),
-        line("sorting alone, ms", 1, &|row| {
-            learned(row, 1e3 * row.order_seconds)
-        }),
-        line("whole picture, composed, s", 2, &|row| row.render_seconds),
+        plain_of("N_b before", 2, &|row| row.node_tests_before),
+        plain_of("N_t before", 2, &|row| row.prim_tests_before),
+        marked("N_b after", &|row| row.node_tests_after.map(Measured::exact)),
+        marked("N_t after", &|row| row.prim_tests_after.map(Measured::exact)),
+        plain_of("N_b unsorted", 2, &|row| row.node_tests_unsorted),
+        plain_of("N_t unsorted", 2, &|row| row.prim_tests_unsorted),
     ];
+    if first.top_node_tests_after.is_some() {
+        lines.extend([
+            plain_of("top level: N_b before", 2, &|row| row.top_node_tests_before),
+            marked("top level: N_b after", &|row| {
+                row.top_node_tests_after.map(Measured::exact)
+            }),
+            plain_of("top level: N_b unsorted", 2, &|row| row.top_node_tests_unsorted),
+        ]);
+    }
+    lines.extend([
+        plain_of("logging, s", 2, &|row| learned(row, row.log_seconds)),
+        plain_of("sorting, ms", 1, &|row| learned(row, 1e3 * row.sort_seconds)),
+    ]);
+    // A time without a spread marks nothing.
+    let timed = |value: Option<f64>, range: Option<[f64; 2]>, rounds: u32| {
+        let whole = [f64::NEG_INFINITY, f64::INFINITY];
+        let range = range.filter(|_| rounds > 1).unwrap_or(whole);
+        value.map(|value| Measured { value, range })
+    };
+    lines.push(marked("whole picture, composed, s", &|row| {
+        timed(row.render_seconds, row.render_seconds_range, row.timed_renderings)
+    }));
     if first.timed_renderings > 1 {
         let cells = plain(&own, |row| {
             row.spread().map(|spread| match spread {
@@ -166,30 +197,15 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
         lines.push(Line::new("most / least of the rounds", cells));
     }
     if own.iter().any(|row| row.measured_seconds.is_some()) {
-        lines.push(line("whole picture, measured, s", 2, &|row| {
-            row.measured_seconds
+        lines.push(marked("whole picture, measured, s", &|row| {
+            let (value, range) = (row.measured_seconds, row.measured_seconds_range);
+            timed(value, range, row.measured_renderings)
         }));
         let spread = |row: &Row| row.measured_seconds_range.map(|[least, most]| most / least);
-        lines.push(line("slowest / fastest measured", 2, &spread));
-    }
-    if first.top_node_tests_after.is_some() {
-        let top = [
-            line("node tests while logging, top level", 2, &|row| {
-                row.top_node_tests_logging
-            }),
-            line("node tests before, top level", 2, &|row| {
-                row.top_node_tests_before
-            }),
-            line("node tests after, top level", 2, &|row| {
-                row.top_node_tests_after
-            }),
-        ];
-        for (place, line) in top.into_iter().enumerate().rev() {
-            lines.insert(2 * place + 2, line);
-        }
+        lines.push(plain_of("slowest / fastest measured", 2, &spread));
     }
     let theirs = paper::counterpart(&first.scene);
-    let mut text = "Means per shadow ray. While logging: over the training rays, as the paper has its figures before sorting. Before and after: over all other rays, the same for every order. Composed: own queries, building and learning, with the shading and the film that all trees share. Measured: rendered apart. The best of each row is marked.".to_owned();
+    let mut text = "N_b: node tests, N_t: primitive tests, means per shadow ray. Before: over the training rays while they are logged, as in the paper. After: over the held-out rays, which are the same for every order. Unsorted: over the held-out rays, before the children are ordered. Sorting: the child order only. Composed: own queries and learning, with the shading and the film that all trees share, without building the first tree. Measured: rendered apart. Marked: the best of a row, and what its spread does not tell from it.".to_owned();
     if let Some(theirs) = theirs {
         let found: Vec<Option<&Figures>> = own
             .iter()
@@ -207,25 +223,23 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
             });
             let quote = |name: &str, decimals, value: &dyn Fn(&Figures) -> Option<f64>| Line {
                 quoted: true,
-                ..marked_line(
+                ..plain_line(
                     format!("{}: {name}", theirs.name),
                     &found.iter().map(|f| f.and_then(value)).collect::<Vec<_>>(),
                     decimals,
-                    false,
                 )
             };
             if let Some(note) = paper::differences(&first.scene) {
-                text.push_str(&format!(" {note} Leaves hold up to 8 primitives here unless the builder is binned-sah-4, and 4 there, so primitive tests are more and node tests fewer."));
+                text.push_str(&format!(" {note}"));
+                if !first.tree.starts_with("pbrt") {
+                    text.push_str(" Leaves hold up to 8 primitives here and 4 there, so primitive tests are more and node tests fewer; the builder pbrt has the leaves of the paper.");
+                }
             }
             lines.extend([
-                quote("box tests before", 2, &|f| Some(f.box_tests_before)),
-                quote("prim tests before", 2, &|f| Some(f.prim_tests_before)),
-                quote("box tests after", 2, &|f| {
-                    f.box_tests_after.or(Some(f.box_tests_before))
-                }),
-                quote("prim tests after", 2, &|f| {
-                    f.prim_tests_after.or(Some(f.prim_tests_before))
-                }),
+                quote("N_b before", 2, &|f| f.n_b_before()),
+                quote("N_t before", 2, &|f| f.n_t_before()),
+                quote("N_b after", 2, &|f| Some(f.n_b_after())),
+                quote("N_t after", 2, &|f| Some(f.n_t_after())),
                 quote("logging, s", 1, &|f| f.logging_s),
                 quote("sorting, ms", 0, &|f| f.sorting_ms),
                 quote("rendering, s", 0, &|f| Some(f.total_render_s)),
@@ -236,7 +250,7 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
         Block::table(
             format!("Renderings, {width} wide, tree {tree}, collapse {collapse}"),
             text,
-            own.iter().map(|row| row.order.clone()),
+            own.iter().map(|row| order_name(plan, row)),
             lines,
         )
         .wide(),

@@ -50,21 +50,21 @@ pub fn strip(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Block, Error> {
     ))
 }
 
-/// The combinations of least cost.
+/// The fastest combinations.
 pub fn best(plan: &Plan, rows: &[&Row], kind: Kind) -> Block {
     let widths = plan.widths.len();
     let mut sorted = rows.to_vec();
     let cost = |row: &Row| row.cost(&plan.costs);
-    let rank = |row: &Row| cost(row).unwrap_or(f64::INFINITY);
-    sorted.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
+    let rank = |row: &Row| row.speed.unwrap_or(0.0);
+    sorted.sort_by(|a, b| rank(b).total_cmp(&rank(a)));
     sorted.truncate(MOST_BEST);
     let head = [
         "cost",
         "nodes",
         "prims",
         "nodes, occluded",
-        "Mray/s",
         "speed",
+        "of the rounds",
     ];
     let lines = sorted.iter().map(|row| {
         let mut name = format!("{} {} {}", row.tree, row.collapse, row.order);
@@ -76,15 +76,15 @@ pub fn best(plan: &Plan, rows: &[&Row], kind: Kind) -> Block {
             Cell::number(row.node_tests_after, 3),
             Cell::number(row.prim_tests_after, 3),
             Cell::number(row.node_tests_occluded, 3),
-            Cell::number(row.mrays_per_s, 1),
             Cell::number(row.speed, 2),
+            Cell::plain(range(row.speed_range)),
         ];
         Line::new(name, cells)
     });
     Block::table(
-        format!("Best combinations, {}", words(kind)),
+        format!("Fastest combinations, {}", words(kind)),
         format!(
-            "The {} of {} with the least cost. Cost: node tests and {} times the primitive tests. Speed: relative to order simple on the default tree collapsed by area, one thread, timed in turn.",
+            "The {} of {} with the highest measured speed. Speed: relative to order simple on the default tree collapsed by area, one thread, median of interleaved rounds, then the least and the most. Cost: node tests and {} times the primitive tests.",
             sorted.len(),
             rows.len(),
             plan.costs.prim
@@ -92,6 +92,11 @@ pub fn best(plan: &Plan, rows: &[&Row], kind: Kind) -> Block {
         head,
         lines.collect(),
     )
+}
+
+/// Least and most in words.
+fn range(range: Option<[f64; 2]>) -> String {
+    range.map_or_else(|| "-".to_owned(), |[least, most]| format!("{least:.2} to {most:.2}"))
 }
 
 /// Costs predicted by the paper's model, against measured ones.

@@ -2,7 +2,7 @@
 
 use antumbra::recipe::{Builder, Collapse, CostModel, Order};
 
-use super::blocks::words;
+use super::blocks::{Measured, words};
 use crate::study::{By, Combination, Kind, Part, Plan, Row};
 
 /// The measured combinations of all scenes.
@@ -127,10 +127,9 @@ impl Summary {
         (!logs.is_empty() && mean.is_finite()).then(|| mean.exp())
     }
 
-    /// The combination of least cost for a kind of rays, over all widths.
-    pub fn best(&self, kind: Kind) -> Option<Best> {
+    /// All measured combinations that learn by the plan's cost of a primitive test.
+    fn combinations(&self) -> Vec<Combination> {
         let mut seen: Vec<Combination> = Vec::new();
-        let mut best: Option<Best> = None;
         for (_, row) in &self.rows {
             let parsed = || {
                 let mut widths = self.widths.iter();
@@ -139,19 +138,57 @@ impl Summary {
                     tree: row.tree.parse().ok()?,
                     collapse: row.collapse.parse().ok()?,
                     order: row.order.parse().ok()?,
+                    prim_cost: None,
                 })
             };
-            let Some(combination) = parsed().filter(|c| !seen.contains(c)) else {
-                continue;
-            };
-            seen.push(combination);
-            if let Some(gain) = self.cost_gain(kind, &combination)
-                && best.as_ref().is_none_or(|best| gain > best.gain)
-            {
-                best = Some(Best { combination, gain });
+            if let Some(found) = parsed().filter(|found| !seen.contains(found)) {
+                seen.push(found);
             }
         }
-        best
+        seen
+    }
+
+    /// The combination of least cost for a kind of rays, over all widths.
+    pub fn best(&self, kind: Kind) -> Option<Best> {
+        let with_gain = |combination| {
+            let gain = self.cost_gain(kind, &combination)?;
+            Some(Best { combination, gain })
+        };
+        let all = self.combinations().into_iter().filter_map(with_gain);
+        all.reduce(|a, b| if b.gain > a.gain { b } else { a })
+    }
+
+    /// Measured rate of a combination relative to the reference of its kind of rows, with least and most of the rounds:
+    /// geometric means of the scenes. The speed of replays, or else one over the composed times of pictures. `None`
+    /// unless there are several rounds in all scenes that have such rays.
+    fn rate(&self, kind: Kind, combination: &Combination) -> Option<Measured> {
+        let mut logs = [0.0; 3];
+        let mut scenes = 0;
+        for scene in 0..self.scenes {
+            if !(self.rows.iter()).any(|(place, row)| *place == scene && row.rays == kind) {
+                continue;
+            }
+            let row = self.row(scene, kind, combination)?;
+            let composed = || {
+                let [least, most] = row.render_seconds_range?;
+                let several = row.timed_renderings > 1;
+                several.then_some([1.0 / row.render_seconds?, 1.0 / most, 1.0 / least])
+            };
+            let replayed = || {
+                let [least, most] = row.speed_range?;
+                Some([row.speed?, least, most])
+            };
+            let rates = replayed().or_else(composed)?;
+            for (log, rate) in logs.iter_mut().zip(rates) {
+                *log += f64::ln(rate);
+            }
+            scenes += 1;
+        }
+        let [value, least, most] = logs.map(|log| (log / f64::from(scenes)).exp());
+        (scenes > 0 && value.is_finite()).then_some(Measured {
+            value,
+            range: [least, most],
+        })
     }
 
     /// Figures for the top of the page: what a user gets, and the cheapest of all that was measured. Each has a label, a
@@ -260,26 +297,116 @@ impl Summary {
         if whole { lines } else { Vec::new() }
     }
 
-    /// What a reader should use, in one sentence.
+    /// What a reader should use: by measured rate where rates were measured in several rounds, by cost otherwise, and
+    /// which of both.
     pub fn advice(&self) -> Option<String> {
-        let Best { combination, gain } = self.best(Kind::Shadow).or_else(|| self.best(Kind::Ao))?;
+        let kind = Kind::ALL.into_iter().find(|kind| self.best(*kind).is_some())?;
+        let advice = self.by_rate(kind).or_else(|| self.by_cost(kind))?;
+        let learning = self.over_free_orders();
+        Some(match learning {
+            Some(learning) => format!("{advice} {learning}"),
+            None => advice,
+        })
+    }
+
+    /// The advice by measured rate. The default is recommended unless something beats it beyond the spread of both.
+    fn by_rate(&self, kind: Kind) -> Option<String> {
+        let with_rate = |c: Combination| Some((c, self.rate(kind, &c)?));
+        let all: Vec<_> = self.combinations().into_iter().filter_map(with_rate).collect();
+        let (best, rate) = (all.iter().copied()).reduce(|a, b| if b.1.value > a.1.value { b } else { a })?;
+        if all.len() < 2 {
+            return None;
+        }
+        let [_, default] = ends(best.width);
+        let own = all.iter().find(|(combination, _)| *combination == default);
+        let what = match self.rows.iter().any(|(_, row)| row.by == By::Replay) {
+            true => format!("rate of {}", words(kind)),
+            false => "time of whole pictures, composed".to_owned(),
+        };
+        let ratio = |of: &Measured| rate.value / of.value;
+        let tied = |of: &Measured| !rate.beats(of, true);
+        Some(match own {
+            Some((_, own)) if tied(own) => format!(
+                "Use the default: by measured {what}, nothing here is faster beyond the spread of the rounds."
+            ),
+            Some((_, own)) => format!(
+                "Use {}: by measured {what} it is {:.2} times as fast as the default, which is beyond the spread of the rounds.",
+                named(&best),
+                ratio(own)
+            ),
+            // Of equals, the first of those that learn nothing.
+            None => {
+                let equals = || all.iter().filter(|(_, rate)| tied(rate));
+                let plain = equals().find(|(c, _)| !c.order.learns() && !c.collapse.needs_log());
+                let count = equals().count();
+                let chosen = plain.map_or(best, |(combination, _)| *combination);
+                match count {
+                    1 => format!(
+                        "Use {}: the fastest of {} by measured {what}, beyond the spread of the rounds.",
+                        named(&chosen),
+                        all.len()
+                    ),
+                    _ => format!(
+                        "Use {}: by measured {what}, {count} of {} are equally fast within the spread of the rounds, and this is one of the simplest.",
+                        named(&chosen),
+                        all.len()
+                    ),
+                }
+            }
+        })
+    }
+
+    /// The advice by cost.
+    fn by_cost(&self, kind: Kind) -> Option<String> {
+        let Best { combination, gain } = self.best(kind)?;
         let [_, default] = ends(combination.width);
-        let own = self.cost_gain(Kind::Shadow, &default);
+        let own = self.cost_gain(kind, &default);
+        let words = words(kind);
+        let unmeasured = "No rates were measured in several rounds.";
         Some(match own {
             Some(own) if gain < 1.01 * own => {
-                "Use the default: nothing measured here costs shadow rays less.".to_owned()
+                format!("By cost, use the default: nothing counted here costs {words} less. {unmeasured}")
             }
             Some(own) if gain < 1.03 * own => format!(
-                "Use the default: the best of all measured here costs shadow rays {:.0} % less.",
+                "By cost, use the default: the best of all counted here costs {words} {:.0} % less. {unmeasured}",
                 100.0 * (1.0 - own / gain)
             ),
+            _ if combination.order.picks_by_ray() => format!(
+                "By cost, {} is the least for {words}, but it decides for each ray, which costs time that is not counted. {unmeasured}",
+                named(&combination)
+            ),
             _ => format!(
-                "Use order {} on builder {} with collapse {}: no combination measured here costs shadow rays less.",
-                combination.order, combination.tree, combination.collapse
+                "By cost, use {}: nothing counted here costs {words} less. {unmeasured}",
+                named(&combination)
             ),
         })
     }
+
+    /// What learning an order gains over the best static order that needs no rays, on trees that learned nothing: in
+    /// cost, as geometric mean of the scenes. `None` unless both were measured.
+    pub fn over_free_orders(&self) -> Option<String> {
+        let kind = Kind::ALL.into_iter().find(|kind| self.best(*kind).is_some())?;
+        let base = |c: &Combination| {
+            (c.tree, c.collapse) == self.reference && !c.tree.needs_rays() && !c.collapse.needs_log()
+        };
+        let least = |wanted: fn(Order) -> bool| {
+            let all = self.combinations().into_iter();
+            let own = all.filter(|c| base(c) && wanted(c.order) && !c.order.picks_by_ray());
+            let with_gain = own.filter_map(|c| Some((c.order, self.cost_gain(kind, &c)?)));
+            with_gain.reduce(|a, b| if b.1 > a.1 { b } else { a })
+        };
+        let (free, of_free) = least(|order| FREE_ORDERS.contains(&order))?;
+        let (learned, of_learned) = least(Order::learns)?;
+        Some(format!(
+            "Of the orders without rays, {free} costs {} least; learning ({learned}) costs {:.2} times less than that.",
+            words(kind),
+            of_learned / of_free
+        ))
+    }
 }
+
+/// Static orders that need no rays, and are more than an arbitrary beginning.
+const FREE_ORDERS: [Order; 3] = [Order::Embree, Order::Sato, Order::Rtsah];
 
 /// A combination in words.
 fn named(combination: &Combination) -> String {
@@ -288,8 +415,9 @@ fn named(combination: &Combination) -> String {
         tree,
         collapse,
         order,
+        prim_cost: _,
     } = combination;
-    format!("{order} on {tree}, collapse {collapse}, {width} wide")
+    format!("order {order} on builder {tree}, collapse {collapse}, {width} wide")
 }
 
 /// Whether a row is of a combination.
@@ -299,10 +427,12 @@ fn is_of(row: &Row, combination: &Combination) -> bool {
         tree,
         collapse,
         order,
+        prim_cost,
     } = combination;
     row.width == width.lanes()
         && row.is_on(tree.name(), collapse.name())
         && row.order == order.name()
+        && prim_cost.is_none_or(|cost| row.prim_cost == f64::from(cost))
 }
 
 /// The trees of the paper, unsorted, and the default.
@@ -410,6 +540,94 @@ mod tests {
         let last = rows.iter_mut().rfind(|(_, row)| is_of(row, &default));
         last.expect("a row").1.measured_seconds = None;
         assert_eq!(card(&Summary::new(&two, &rows)), None);
+    }
+
+    /// Rows of replays: cost of node tests only, and speeds with their range.
+    fn replayed(plan: &Plan, figures: &[(Combination, f64, [f64; 3])]) -> Vec<(usize, Row)> {
+        let first = study::run(plan, &()).expect("rows").placed.remove(0).1;
+        let row = |(combination, nodes, [speed, least, most]): &(Combination, f64, [f64; 3])| Row {
+            by: By::Replay,
+            tree: combination.tree.to_string(),
+            collapse: combination.collapse.to_string(),
+            order: combination.order.to_string(),
+            node_tests_after: Some(*nodes),
+            prim_tests_after: Some(0.0),
+            speed: Some(*speed),
+            speed_range: Some([*least, *most]),
+            ..first.clone()
+        };
+        figures.iter().map(|figures| (0, row(figures))).collect()
+    }
+
+    /// The cheapest combination may be the slowest one: an order that decides for each ray. By cost alone it would be
+    /// recommended.
+    #[test]
+    fn advice_is_by_rate_and_not_by_cost() {
+        let plan = plan(1);
+        let [paper, default] = ends(WIDTH);
+        let by_ray = Combination {
+            order: Order::TwoWay,
+            ..default
+        };
+        let mut figures = vec![
+            (paper, 9.0, [0.9, 0.88, 0.93]),
+            (default, 6.0, [1.04, 1.0, 1.08]),
+            (by_ray, 4.0, [0.45, 0.44, 0.47]),
+        ];
+        let advice = |figures: &[_]| {
+            let rows = replayed(&plan, figures);
+            Summary::new(&plan, &rows).advice().expect("advice")
+        };
+        let found = advice(&figures);
+        assert!(found.starts_with("Use the default: by measured rate of shadow rays"), "{found}");
+        // A faster median within the spread is no reason to leave the default; beyond it is.
+        let embree = Combination {
+            order: Order::Embree,
+            ..paper
+        };
+        figures.push((embree, 7.0, [1.07, 1.03, 1.1]));
+        let found = advice(&figures);
+        assert!(found.starts_with("Use the default"), "{found}");
+        figures[3].2 = [1.3, 1.2, 1.4];
+        let found = advice(&figures);
+        let wanted = format!("Use {}: by measured rate of shadow rays it is 1.25 times", named(&embree));
+        assert!(found.starts_with(&wanted), "{found}");
+        // Without the default, an order that learns nothing is preferred among equals.
+        figures.remove(1);
+        figures[2].2 = [0.92, 0.9, 0.95];
+        let found = advice(&figures);
+        let wanted = format!("Use {}: by measured rate of shadow rays, 2 of 3 are equally", named(&paper));
+        assert!(found.starts_with(&wanted), "{found}");
+        // Rows without rounds: by cost, and it says so.
+        let mut rows = replayed(&plan, &figures);
+        for (_, row) in &mut rows {
+            (row.speed, row.speed_range) = (None, None);
+        }
+        let found = Summary::new(&plan, &rows).advice().expect("advice");
+        assert!(found.starts_with("By cost, ") && found.contains("decides for each ray"), "{found}");
+        assert!(found.contains("No rates were measured"), "{found}");
+    }
+
+    /// What learning gains is told against the best of the free orders, not against the arbitrary one.
+    #[test]
+    fn learning_is_compared_with_the_best_order_without_rays() {
+        let plan = plan(1);
+        let [paper, _] = ends(WIDTH);
+        let of = |order| Combination { order, ..paper };
+        let still = [1.0, 1.0, 1.0];
+        let rows = replayed(
+            &plan,
+            &[
+                (of(Order::Simple), 12.0, still),
+                (of(Order::Embree), 9.0, still),
+                (of(Order::Sato), 10.0, still),
+                (of(Order::Joint), 7.5, still),
+            ],
+        );
+        let found = Summary::new(&plan, &rows).over_free_orders().expect("both");
+        assert!(found.contains("embree costs shadow rays least"), "{found}");
+        assert!(found.contains("(joint) costs 1.20 times less"), "{found}");
+        assert_eq!(Summary::new(&plan, &rows[2..3]).over_free_orders(), None);
     }
 
     #[test]

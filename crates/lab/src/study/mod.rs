@@ -135,6 +135,10 @@ fn header(plan: &Plan) -> Header {
             true => String::new(),
             false => format!("{:?}", plan.costs),
         },
+        match &*plan.more_prim_costs {
+            [] => String::new(),
+            more => format!("and C_p {more:?}"),
+        },
     ];
     let words: Vec<String> = words.into_iter().filter(|word| !word.is_empty()).collect();
     let scene = |subject: &Subject| {
@@ -145,7 +149,7 @@ fn header(plan: &Plan) -> Header {
         (subject.scene.name.clone(), print)
     };
     Header {
-        schema: "antumbra.study.journal/2".to_owned(),
+        schema: "antumbra.study.journal/3".to_owned(),
         version: env!("CARGO_PKG_VERSION").to_owned(),
         plan: words.join(" "),
         scenes: plan.scenes.iter().map(scene).collect(),
@@ -220,6 +224,7 @@ impl<'a> Study<'a> {
             level: plan.isa.level().to_string(),
             threads: rayon::current_num_threads(),
             spp: plan.spp_of(subject),
+            prim_cost: plan.costs.prim,
         };
         let studio = Studio {
             plan,

@@ -73,7 +73,10 @@ impl Studio<'_> {
             .builder(combination.tree)
             .collapse(combination.collapse)
             .width(combination.width)
-            .costs(self.plan.costs)
+            .costs(match combination.prim_cost {
+                Some(prim) => self.plan.costs.prim(prim),
+                None => self.plan.costs,
+            })
     }
 }
 
@@ -93,9 +96,13 @@ impl Files {
             tree,
             collapse,
             order,
+            prim_cost,
         } = combination;
         let picture = format!("{}-w{width}", subject.stem);
-        let order = order_stem(*order);
+        let mut order = order_stem(*order);
+        if let Some(cost) = prim_cost {
+            order.push_str(&format!("-cp{cost}"));
+        }
         let tests = if (*tree, *collapse) == plan.base() {
             format!("{picture}-tests-{order}")
         } else {

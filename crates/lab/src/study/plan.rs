@@ -40,6 +40,8 @@ pub struct Plan {
     pub rays_from: RaysFrom,
     /// What steps of a traversal cost: to learn by, and to rank by.
     pub costs: CostModel,
+    /// Other costs of a primitive test. On pictures, the child orders of the base tree are learned by these as well.
+    pub more_prim_costs: Vec<f32>,
     /// Bytes that the trees of one picture may take. Trees that find no room are compared on the same picture again.
     pub memory: u64,
     /// Directory of the journal, the report and the pictures, if they are kept.
@@ -68,6 +70,7 @@ impl Default for Plan {
             log_size: LogSize::default(),
             rays_from: RaysFrom::default(),
             costs: CostModel::default(),
+            more_prim_costs: Vec::new(),
             memory: 2 << 30,
             out: None,
             restart: false,
@@ -89,7 +92,7 @@ pub struct Subject {
 }
 
 /// A tree for shadow rays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Combination {
     /// Children per node.
     pub width: Width,
@@ -99,6 +102,8 @@ pub struct Combination {
     pub collapse: Collapse,
     /// Child order.
     pub order: Order,
+    /// Cost of a primitive test to learn by; `None` is what the plan says.
+    pub prim_cost: Option<f32>,
 }
 
 impl Combination {
@@ -109,6 +114,7 @@ impl Combination {
             tree: Builder::BinnedSah,
             collapse: Collapse::Area,
             order: Order::Simple,
+            prim_cost: None,
         }
     }
 
@@ -119,12 +125,13 @@ impl Combination {
             tree: Builder::default(),
             collapse: Collapse::default(),
             order: Order::default(),
+            prim_cost: None,
         }
     }
 }
 
 /// A tree to be compared with others on a picture, or a whole picture to be rendered with it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rendering {
     pub combination: Combination,
     /// 0 for the comparison; whole pictures are numbered from 1.
@@ -132,7 +139,7 @@ pub struct Rendering {
 }
 
 /// Rays to be answered.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Replay {
     pub part: Part,
     pub kind: Kind,
@@ -149,8 +156,11 @@ impl Combination {
             tree,
             collapse,
             order,
+            prim_cost,
         } = self;
-        format!("w{width} {tree} {collapse} {order}")
+        let prim_cost = prim_cost.map(|cost| format!(" C_p {cost}"));
+        let prim_cost = prim_cost.unwrap_or_default();
+        format!("w{width} {tree} {collapse} {order}{prim_cost}")
     }
 }
 
@@ -221,11 +231,19 @@ impl Plan {
             tree,
             collapse,
             order,
+            prim_cost: None,
         };
         let by_all_orders = self.orders.iter().map(|&order| of(base, order));
+        let learned = || self.orders.iter().filter(|order| order.learns());
+        let by_costs = self.more_prim_costs.iter().flat_map(|&cost| {
+            learned().map(move |&order| Combination {
+                prim_cost: Some(cost),
+                ..of(base, order)
+            })
+        });
         let others = self.trees_and_collapses().filter(|pair| *pair != base);
         let by_default = others.map(|pair| of(pair, self.default_order()));
-        let mut all: Vec<_> = by_all_orders.chain(by_default).collect();
+        let mut all: Vec<_> = by_all_orders.chain(by_costs).chain(by_default).collect();
         // What whole pictures gain is told against the unsorted trees of the paper.
         let paper = Combination::of_the_paper(width);
         let wanted = (self.trees.contains(&paper.tree))
@@ -253,6 +271,7 @@ impl Plan {
             tree,
             collapse,
             order,
+            prim_cost: None,
         };
         let (paper, default) = (
             Combination::of_the_paper(width),
@@ -307,6 +326,7 @@ impl Plan {
                             tree,
                             collapse,
                             order,
+                            prim_cost: None,
                         },
                     }));
                 }
@@ -335,6 +355,7 @@ impl Plan {
                         tree,
                         collapse,
                         order,
+                        prim_cost: None,
                     },
                 }));
             }
@@ -370,6 +391,7 @@ impl Plan {
                             tree,
                             collapse,
                             order,
+                            prim_cost: None,
                         },
                     });
                 }

@@ -10,7 +10,7 @@ use super::plan::Plan;
 use super::row::Row;
 use crate::{Error, Machine};
 
-/// The JSON document of a study, schema `antumbra.study/1`.
+/// The JSON document of a study, schema `antumbra.study/2`.
 #[derive(Serialize)]
 #[non_exhaustive]
 pub struct Document<'a> {
@@ -66,7 +66,7 @@ impl<'a> Results<'a> {
     /// Everything as a JSON document.
     pub fn document(&self) -> Document<'_> {
         Document {
-            schema: "antumbra.study/1",
+            schema: "antumbra.study/2",
             machine: self.machine.clone(),
             seed: self.plan.seed,
             complete: self.complete,

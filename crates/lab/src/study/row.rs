@@ -9,7 +9,9 @@ use crate::{Compared, ComparedTree};
 
 /// One tree of a picture, or one replay, summed up. Tests are means per occlusion ray.
 ///
-/// "Before" and "after" are measured over the same rays, the held-out ones, and so are all trees of a picture.
+/// Node tests are the paper's N_b, primitive tests its N_t. "Before" is measured over the training rays while they are
+/// logged, "after" over the held-out rays, both as in the paper. "Unsorted" is measured over the held-out rays too, in
+/// the tree before its children are ordered. All trees of a picture answer the same held-out rays.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Row {
@@ -31,6 +33,8 @@ pub struct Row {
     pub collapse: String,
     /// Child order.
     pub order: String,
+    /// Cost of a primitive test by which the child order was learned: C_p, in node tests.
+    pub prim_cost: f64,
     /// Instruction set.
     pub level: String,
     /// Threads of the process.
@@ -49,24 +53,23 @@ pub struct Row {
     pub shadow_share: Option<f64>,
     /// Share of the measured rays that meet something.
     pub occluded_share: f64,
-    /// Node tests of the training rays while they were logged: what the paper has as "before"; null in a replay and
-    /// without learning.
-    pub node_tests_logging: Option<f64>,
-    /// Primitive tests of the training rays while they were logged.
-    pub prim_tests_logging: Option<f64>,
-    /// Node tests of the held-out rays, in the tree before its children are ordered; null in a replay.
+    /// Node tests of the training rays while they were logged; null in a replay and without learning.
     pub node_tests_before: Option<f64>,
-    /// Primitive tests of the held-out rays, in the tree before its children are ordered; null in a replay.
+    /// Primitive tests of the training rays while they were logged.
     pub prim_tests_before: Option<f64>,
+    /// Node tests of the held-out rays, in the tree before its children are ordered; null in a replay.
+    pub node_tests_unsorted: Option<f64>,
+    /// Primitive tests of the held-out rays, in the tree before its children are ordered; null in a replay.
+    pub prim_tests_unsorted: Option<f64>,
     /// Node tests of the held-out rays.
     pub node_tests_after: Option<f64>,
     /// Primitive tests of the held-out rays.
     pub prim_tests_after: Option<f64>,
     /// Node tests of the training rays outside of instances while they were logged; null in a scene without any.
-    pub top_node_tests_logging: Option<f64>,
+    pub top_node_tests_before: Option<f64>,
     /// Node tests of the held-out rays outside of instances, before the children are ordered; null in a scene without
     /// any.
-    pub top_node_tests_before: Option<f64>,
+    pub top_node_tests_unsorted: Option<f64>,
     /// Node tests of the held-out rays outside of instances; null in a scene without any.
     pub top_node_tests_after: Option<f64>,
     /// Node tests of the occluded rays; null in a rendering.
@@ -83,10 +86,10 @@ pub struct Row {
     pub predicted_cost_after: Option<f64>,
     /// Time to trace and log the training rays.
     pub log_seconds: f64,
-    /// Time to order the children.
+    /// Time to plan and apply the child order, without anything else.
     pub sort_seconds: f64,
-    /// Part of it that plans and applies the order: sorting alone, as the paper has it.
-    pub order_seconds: f64,
+    /// Time to build or collapse the tree again for the training rays; null in a replay.
+    pub remake_seconds: Option<f64>,
     /// Time to build and collapse the tree.
     pub build_seconds: f64,
     /// Time of a whole picture; null in a replay.
@@ -107,8 +110,10 @@ pub struct Row {
     pub busy_seconds: Option<Split>,
     /// Millions of rays per second on one thread, in batches; null in a rendering.
     pub mrays_per_s: Option<f64>,
-    /// Speed relative to order `simple` on the default tree collapsed by area, timed in turn with it.
+    /// Speed relative to order `simple` on the default tree collapsed by area: median of interleaved rounds.
     pub speed: Option<f64>,
+    /// Least and most of the speeds of the rounds.
+    pub speed_range: Option<[f64; 2]>,
     /// Whether all answers were those of that tree, or of the first tree of a picture, bit for bit.
     pub equal_answers: Option<bool>,
     /// Hash of the image, as 16 hexadecimal digits; null in a replay, and of a tree whose answers differ.
@@ -135,6 +140,8 @@ pub struct Common {
     pub level: String,
     pub threads: usize,
     pub spp: u32,
+    /// Cost of a primitive test.
+    pub prim_cost: f32,
 }
 
 /// Figures of a replay.
@@ -154,6 +161,7 @@ pub struct Replayed {
     pub build_seconds: f64,
     pub mrays_per_s: f64,
     pub speed: f64,
+    pub speed_range: [f64; 2],
     pub equal_answers: bool,
 }
 
@@ -176,20 +184,20 @@ impl Row {
             shadow_rays: Some(picture.shadow_rays),
             shadow_share: Some(share(picture.shadow_rays, rays)),
             occluded_share: share(picture.occluded_rays, picture.shadow_rays),
-            node_tests_logging: of(tree.logging, 0),
-            prim_tests_logging: of(tree.logging, 1),
-            node_tests_before: of(tree.before, 0),
-            prim_tests_before: of(tree.before, 1),
+            node_tests_before: of(tree.logging, 0),
+            prim_tests_before: of(tree.logging, 1),
+            node_tests_unsorted: of(tree.before, 0),
+            prim_tests_unsorted: of(tree.before, 1),
             node_tests_after: of(tree.after, 0),
             prim_tests_after: of(tree.after, 1),
-            top_node_tests_logging: top(tree.logging),
-            top_node_tests_before: top(tree.before),
+            top_node_tests_before: top(tree.logging),
+            top_node_tests_unsorted: top(tree.before),
             top_node_tests_after: top(tree.after),
             predicted_cost_before: tree.predicted.map(|[before, _]| before),
             predicted_cost_after: tree.predicted.map(|[_, after]| after),
             log_seconds: tree.log_seconds,
-            sort_seconds: tree.sort_seconds,
-            order_seconds: tree.order_seconds,
+            sort_seconds: tree.order_seconds,
+            remake_seconds: Some((tree.sort_seconds - tree.order_seconds).max(0.0)),
             build_seconds: tree.build_seconds,
             render_seconds: times.get(times.len() / 2).copied(),
             render_time: Some(RenderTime::Composed),
@@ -232,10 +240,10 @@ impl Row {
             predicted_cost_after: found.predicted.map(|[_, after]| after),
             log_seconds: found.log_seconds,
             sort_seconds: found.sort_seconds,
-            order_seconds: found.sort_seconds,
             build_seconds: found.build_seconds,
             mrays_per_s: Some(found.mrays_per_s),
             speed: Some(found.speed),
+            speed_range: Some(found.speed_range),
             equal_answers: Some(found.equal_answers),
             ..Self::empty(common, &replay.combination, By::Replay)
         }
@@ -253,6 +261,7 @@ impl Row {
             tree: combination.tree.name().to_owned(),
             collapse: combination.collapse.name().to_owned(),
             order: combination.order.name().to_owned(),
+            prim_cost: f64::from(combination.prim_cost.unwrap_or(common.prim_cost)),
             level: common.level.clone(),
             threads: common.threads,
             spp: common.spp,
@@ -262,14 +271,14 @@ impl Row {
             shadow_rays: None,
             shadow_share: None,
             occluded_share: 0.0,
-            node_tests_logging: None,
-            prim_tests_logging: None,
             node_tests_before: None,
             prim_tests_before: None,
+            node_tests_unsorted: None,
+            prim_tests_unsorted: None,
             node_tests_after: None,
             prim_tests_after: None,
-            top_node_tests_logging: None,
             top_node_tests_before: None,
+            top_node_tests_unsorted: None,
             top_node_tests_after: None,
             node_tests_occluded: None,
             node_tests_unoccluded: None,
@@ -279,7 +288,7 @@ impl Row {
             predicted_cost_after: None,
             log_seconds: 0.0,
             sort_seconds: 0.0,
-            order_seconds: 0.0,
+            remake_seconds: None,
             build_seconds: 0.0,
             render_seconds: None,
             render_time: None,
@@ -291,6 +300,7 @@ impl Row {
             busy_seconds: None,
             mrays_per_s: None,
             speed: None,
+            speed_range: None,
             equal_answers: None,
             image_hash: None,
         }
