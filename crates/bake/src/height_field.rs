@@ -1,6 +1,7 @@
 //! Height fields: heights in the cells of a raster, as the surface of triangles that its mesh has.
 
 use std::collections::HashSet;
+use std::ops::Range;
 
 use crate::{Error, memory};
 
@@ -17,6 +18,8 @@ pub struct HeightField<'a> {
     rows: &'a [f64],
     /// The same heights, column by column.
     columns: Vec<f64>,
+    /// Tops of rows and of columns: see [`tops`].
+    tops: [Vec<f64>; 2],
     transform: [f64; 6],
     wires: HashSet<Wire>,
 }
@@ -65,7 +68,9 @@ impl<'a> HeightField<'a> {
                 }
             }
         }
+        let tops = [tops(heights, width)?, tops(&columns, height)?];
         let mut field = Self {
+            tops,
             width,
             height,
             rows: heights,
@@ -187,6 +192,7 @@ impl<'a> HeightField<'a> {
         let metric = [a * a + d * d, a * b + d * e, b * b + e * e];
         let is_east_west = matches!(side, Side::East | Side::West);
         let [xx, xy, yy] = metric;
+        let tops = &self.tops[usize::from(is_east_west)][..];
         let (heights, size, at, metric) = match is_east_west {
             true => (
                 &self.columns[..],
@@ -214,9 +220,33 @@ impl<'a> HeightField<'a> {
             metric,
             is_turned,
             is_east_west,
+            tops,
             wires: &self.wires,
         }
     }
+}
+
+/// Cells of a block of a line.
+const BLOCK: usize = 32;
+
+/// Cells on both sides of a block that its top counts: those that edges of the block may end at.
+const MARGIN: usize = 2;
+
+/// Largest height in each block of each line, and in the cells beside it.
+fn tops(heights: &[f64], length: usize) -> Result<Vec<f64>, Error> {
+    let mut tops = Vec::new();
+    for line in heights.chunks_exact(length) {
+        memory::grow(&mut tops, "heights", length.div_ceil(BLOCK))?;
+        tops.extend((0..length).step_by(BLOCK).map(|first| {
+            let cells = first.saturating_sub(MARGIN)..(first + BLOCK + MARGIN).min(length);
+            let known = line[cells]
+                .iter()
+                .copied()
+                .filter(|height| height.is_finite());
+            known.fold(f64::NEG_INFINITY, f64::max)
+        }));
+    }
+    Ok(tops)
 }
 
 /// Millionths of a cell, as a power of two.
@@ -247,6 +277,7 @@ pub(crate) struct View<'a> {
     pub metric: [f64; 3],
     is_turned: bool,
     is_east_west: bool,
+    tops: &'a [f64],
     wires: &'a HashSet<Wire>,
 }
 
@@ -263,6 +294,39 @@ impl View<'_> {
         match self.is_turned {
             true => self.heights.len() - 1 - index,
             false => index,
+        }
+    }
+
+    /// Number of blocks of a line.
+    fn blocks(&self) -> usize {
+        self.length.div_ceil(BLOCK)
+    }
+
+    /// Place of the first block, which may be before the first cell.
+    fn first_block(&self) -> isize {
+        match self.is_turned {
+            true => self.length as isize - (BLOCK * self.blocks()) as isize,
+            false => 0,
+        }
+    }
+
+    /// Block of a cell of a line.
+    pub fn block(&self, at: usize) -> usize {
+        (at as isize - self.first_block()) as usize / BLOCK
+    }
+
+    /// Cells of a block.
+    pub fn cells(&self, block: usize) -> Range<usize> {
+        let first = (BLOCK * block) as isize + self.first_block();
+        first.max(0) as usize..((first + BLOCK as isize) as usize).min(self.length)
+    }
+
+    /// Largest height in a block of a line, and in the two cells on both sides of it.
+    pub fn top(&self, line: usize, block: usize) -> f64 {
+        let index = line * self.blocks() + block;
+        match self.is_turned {
+            true => self.tops[self.tops.len() - 1 - index],
+            false => self.tops[index],
         }
     }
 
@@ -292,6 +356,12 @@ impl View<'_> {
     pub fn squared(&self, x: f64, y: f64) -> f64 {
         let [xx, xy, yy] = self.metric;
         xx * x * x + 2.0 * xy * x * y + yy * y * y
+    }
+
+    /// Least squared length in plan to a place so many lines ahead.
+    pub fn least_squared(&self, x: f64) -> f64 {
+        let [xx, xy, yy] = self.metric;
+        x * x * (xx - xy * xy / yy)
     }
 
     /// Distance ahead, in lines, from which on all places are farther than a length in plan.

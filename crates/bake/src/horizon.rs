@@ -232,6 +232,14 @@ impl Horizon {
         std::mem::swap(&mut self.pieces, &mut self.next);
     }
 
+    /// Lowest heights of the horizon, for ranges that begin at ascending values of `m`.
+    pub fn lows(&self) -> Lows<'_> {
+        Lows {
+            horizon: self,
+            piece: 0,
+        }
+    }
+
     /// Height of the horizon for ascending values of `m`, which are between its ends.
     pub fn heights(&self) -> Heights<'_> {
         Heights {
@@ -261,6 +269,36 @@ impl Heights<'_> {
             Some(before) if pieces[self.piece].from == m => height.max(pieces[before].line.at(m)),
             _ => height,
         }
+    }
+}
+
+/// Lowest heights of a horizon from one end to the other.
+pub struct Lows<'a> {
+    horizon: &'a Horizon,
+    piece: usize,
+}
+
+impl Lows<'_> {
+    /// Lowest height in a range, which does not begin before the last one. Infinite if the range is beyond the ends.
+    pub fn at(&mut self, from: f64, to: f64) -> f64 {
+        let Horizon { pieces, end, .. } = self.horizon;
+        let (from, to) = (from.max(pieces[0].from), to.min(*end));
+        if !(from <= to) {
+            return f64::INFINITY;
+        }
+        while self.piece + 1 < pieces.len() && self.horizon.end_of(self.piece) <= from {
+            self.piece += 1;
+        }
+        let mut low = f64::INFINITY;
+        for (piece, Piece { from: start, line }) in pieces.iter().enumerate().skip(self.piece) {
+            if *start > to || low == f64::NEG_INFINITY {
+                break;
+            }
+            low = low
+                .min(line.at(start.max(from)))
+                .min(line.at(self.horizon.end_of(piece).min(to)));
+        }
+        low
     }
 }
 
@@ -313,6 +351,18 @@ mod tests {
                         found == most || (found - most).abs() < 1e-12,
                         "{found} at {m}, not {most}"
                     );
+                }
+            }
+            let mut lows = horizon.lows();
+            for step in 0..20 {
+                let [from, to] = [0.0, 0.3].map(|more| -1.1 + f64::from(step) * 0.1 + more);
+                let low = lows.at(from, to);
+                let mut heights = horizon.heights();
+                for part in 0..=100 {
+                    let m = (from + 0.003 * f64::from(part)).clamp(-1.0, 1.0);
+                    if (from..=to).contains(&m) {
+                        assert!(low <= heights.at(m) + 1e-12, "{low} from {from} to {to}");
+                    }
                 }
             }
             assert!(horizon.pieces.is_sorted_by(|a, b| a.from < b.from));

@@ -71,7 +71,7 @@
 //! - `ambient_occlusion`: the open part of the sky above points
 //! - `view_factors`: light that goes from surface to surface
 //! - `curvature`: lines of sight over a round earth
-//! - `viewshed`: what observers see of a height field;  `height_field`, `horizon`: its surface and its edges as an eye sees them
+//! - `viewshed`: what observers see of a height field, `height_field`;  `sweep`, `horizon`: its edges as an eye sees them
 //! - `visibility`: directions and points that points see;  `exposure`: sums of what they see
 //! - `sky`: the sky in patches;  `sun`: where the sun stands;  `moment`, `clock`: dates, times of day and time zones
 //! - `hourly`: values step by step;  `measures`: classes of sunlight, reflected light
@@ -118,6 +118,7 @@ mod sensors;
 mod sky;
 mod sun;
 mod sunlight;
+mod sweep;
 mod table;
 mod view_factors;
 mod viewshed;

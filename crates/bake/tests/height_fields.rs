@@ -395,7 +395,20 @@ fn what_is_no_field_is_refused() {
         HeightField::new([3, 2], &heights, flat),
         Err(Error::Range { .. })
     ));
-    // One line of cells has no surface, and hides nothing.
+    // A row without neighbours has no surface, and hides nothing.
+    let mut raster = hills([40, 9], PLAIN, 0.0, 0);
+    for (cell, value) in raster.values.iter_mut().enumerate() {
+        *value = [0.0, 0.0, 0.0, f64::NAN, 50.0, f64::NAN, 0.0, 0.0, 0.0][cell / 40];
+    }
+    let case = Case {
+        raster,
+        target: 0.0,
+        drop: 0.0,
+        range: f64::INFINITY,
+    };
+    let observer = case.observer([20.0, 0.0], 1.0).expect("a surface");
+    assert_eq!(case.run(&[observer]).counts().iter().sum::<u32>(), 7 * 40);
+    // Neither has a raster of one row.
     let wall = [0.0, 9.0, 0.0, 9.0, 0.0, 0.0];
     let field = HeightField::new([6, 1], &wall, PLAIN).expect("a field");
     let observers = [Observer {

@@ -2,7 +2,8 @@
 
 use antumbra::{Bvh, Geometry, Recipe};
 use antumbra_bake::{
-    Curvature, EARTH_RADIUS, Eyes, Layout, Orientation, REFRACTION, Sensors, VisibilityJob, run,
+    Curvature, EARTH_RADIUS, Eyes, HeightField, Layout, Observer, Orientation, REFRACTION, Sensors,
+    ViewshedJob, VisibilityJob, run,
 };
 use antumbra_raster::{Grid, Raster};
 
@@ -59,6 +60,34 @@ impl Terrain {
         (0..observers.len())
             .map(|column| (0..bent.len()).map(|row| matrix.get(row, column)).collect())
             .collect()
+    }
+
+    /// The same cells as a height field has them.
+    fn swept(&self, observers: &[usize], eye: f64) -> Vec<Vec<bool>> {
+        let grid = &self.raster.grid;
+        let size = [grid.width, grid.height];
+        let field = HeightField::new(size, &self.raster.values, grid.transform).expect("a field");
+        let observer = |&cell: &usize| Observer {
+            place: [cell % grid.width, cell / grid.width].map(|at| at as f64),
+            height: self.raster.values[cell] + eye,
+            normal: [0.0; 3],
+        };
+        let observers: Vec<Observer> = observers.iter().map(observer).collect();
+        let job = ViewshedJob {
+            field: &field,
+            observers: &observers,
+            target: 0.0,
+            drop: self.curvature.factor(),
+            range: f64::INFINITY,
+        };
+        let bvh = Bvh::build(&[], &Recipe::default()).expect("a tree");
+        let found = run(&job, &bvh, &()).expect("viewsheds");
+        let cells = |observer: usize| {
+            let mut cells = vec![false; self.raster.values.len()];
+            found.seen(observer).for_each(|run| cells[run].fill(true));
+            cells
+        };
+        (0..observers.len()).map(cells).collect()
     }
 
     /// Distance in plan between two cells.
@@ -153,14 +182,14 @@ fn the_horizon_of_a_sphere_is_where_it_should_be() {
 }
 
 /// Pseudorandom hills.
-fn hills() -> Terrain {
+fn hills(size: usize) -> Terrain {
     let noise = |x: usize, y: usize| {
         let mut state = (x as u64 * 0x9E37_79B9 + y as u64 * 0x85EB_CA6B + 1)
             .wrapping_mul(0x2545_F491_4F6C_DD1D);
         state ^= state >> 29;
         (state.wrapping_mul(0xBF58_476D_1CE4_E5B9) >> 40) as f64 / (1 << 24) as f64
     };
-    Terrain::new(100, 30.0, REFRACTION, |x, y| {
+    Terrain::new(size, 30.0, REFRACTION, |x, y| {
         let wave = (x as f64 / 9.0).sin() * (y as f64 / 13.0).cos();
         300.0 + 30.0 * wave + 10.0 * noise(x, y)
     })
@@ -168,7 +197,7 @@ fn hills() -> Terrain {
 
 #[test]
 fn ten_thousand_cells_agree_with_double_precision() {
-    let (hills, eye) = (hills(), 1.7);
+    let (hills, eye) = (hills(100), 1.7);
     let observers = [2525, 5050, 7710, 0, 9999];
     let found = hills.seen(&observers, eye, None);
     let (mut visible, mut close) = (0, 0);
@@ -195,8 +224,33 @@ fn ten_thousand_cells_agree_with_double_precision() {
 }
 
 #[test]
+fn height_fields_agree_with_double_precision() {
+    let (hills, eye) = (hills(300), 5.0);
+    let observers = [150 * 301, 10 * 300 + 280];
+    let (mut visible, mut close) = (0, 0);
+    for (&observer, seen) in observers.iter().zip(hills.swept(&observers, eye)) {
+        for (target, seen) in seen.into_iter().enumerate() {
+            let clearance = match target == observer {
+                true => f64::INFINITY,
+                false => hills.clearance(observer, target, eye),
+            };
+            visible += usize::from(seen);
+            if clearance.abs() < 1e-9 {
+                close += 1;
+                continue;
+            }
+            assert_eq!(seen, clearance > 0.0, "{observer} to {target}: {clearance}");
+        }
+    }
+    assert!(
+        visible > 1000 && close < 5,
+        "{visible} visible, {close} close"
+    );
+}
+
+#[test]
 fn a_radius_leaves_out_what_is_farther() {
-    let hills = hills();
+    let hills = hills(100);
     let all = &hills.seen(&[5050], 1.7, None)[0];
     let near = &hills.seen(&[5050], 1.7, Some(600.0))[0];
     for target in 0..all.len() {
