@@ -70,6 +70,12 @@ impl<'a> Hourly<'a> {
         self.sunlight.timeline()[step].0.begin
     }
 
+    /// Beginning of a step in Unix time.
+    pub fn unix(&self, step: usize) -> f64 {
+        let step = &self.sunlight.timeline()[step].0;
+        step.middle - 1800.0 * step.hours
+    }
+
     /// What a sensor receives in a step: a row of the matrices of what sensors see, and its normal in the scene, or none in free
     /// space. `None` if the normal has no direction. Sums over all steps are the [`SunValues`](crate::SunValues).
     pub fn receipt(

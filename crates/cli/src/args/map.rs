@@ -1,7 +1,7 @@
 //! Flags of maps.
 
 use antumbra_image::heatmap;
-use antumbra_map::Map;
+use antumbra_map::{Map, Theme};
 use clap::Args;
 
 use super::heading;
@@ -25,6 +25,9 @@ pub struct MapArgs {
     /// colours of a .ply.
     #[arg(long, num_args = 2, value_names = ["MIN", "MAX"], allow_negative_numbers = true, help_heading = heading::OUTPUT)]
     pub range: Option<Vec<f64>>,
+    /// Light text on a dark ground, for slides
+    #[arg(long, help_heading = heading::OUTPUT)]
+    pub dark: bool,
 }
 
 impl MapArgs {
@@ -43,6 +46,14 @@ impl MapArgs {
                 Err(Failure::Usage(reason))
             }
             _ => Ok(()),
+        }
+    }
+
+    /// Colours of paper and text.
+    pub fn theme(&self) -> Theme {
+        match self.dark {
+            true => Theme::Dark,
+            false => Theme::Light,
         }
     }
 

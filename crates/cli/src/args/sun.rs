@@ -37,7 +37,8 @@ pub struct SunArgs {
     pub raster: RasterArgs,
     /// Table of every step of time and every sensor
     ///
-    /// A .csv with a line per step and a column per sensor: the value of --show of this step, in hours or Wh/m².
+    /// A .csv with a line per step and a column per sensor: the value of --show of this step, in hours or Wh/m². An .npz has the
+    /// array values, steps x sensors, with times, the beginnings of the steps in Unix time, and points.
     #[arg(long, value_name = "FILE", value_parser = values::output_file(), conflicts_with = "shard", help_heading = heading::OUTPUT)]
     pub hourly: Option<PathBuf>,
     /// Figures as JSON; - is the standard output

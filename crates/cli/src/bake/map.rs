@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use antumbra_bake::{Grid, Layout, Moment, Orientation, Sensors, UpAxis};
 use antumbra_image::atomic_write;
-use antumbra_map::{Map, Relief, Steps, Theme};
+use antumbra_map::{Map, Relief, Steps};
 
 use super::ground::Ground;
 use crate::args::MapArgs;
@@ -107,7 +107,7 @@ pub fn write(
         steps,
         source: &source,
         relief: None,
-        theme: Theme::Light,
+        theme: args.theme(),
     };
     let size = args.resolution.map_or(map.usual_size(), |size| size.0);
     let [columns, rows] = map.relief_size(size).map_err(Failure::work)?;

@@ -3,7 +3,7 @@
 //! Each command turns its arguments into a job of the crate `antumbra-bake`, and the result into files and a document.
 //!
 //! - `ao`, `sun`, `visible`: one command each;  `merge`: parts of one of them become the whole
-//! - `viewshed`: `visible --viewshed` of a height raster
+//! - `hourly`: steps of time of `sun`;  `viewshed`: `visible --viewshed` of a height raster
 //! - `command`: the steps that all of them have in common
 //! - `ground`, `view`: scenes, and points of them
 //! - `chunks`: files of unfinished work and of shares
@@ -14,6 +14,7 @@ pub mod chunks;
 mod command;
 mod files;
 mod ground;
+mod hourly;
 pub mod map;
 pub mod merge;
 mod raster;

@@ -1,15 +1,13 @@
 //! `antumbra sun`: hours of direct sun, sky view factors and irradiation of sensors.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use antumbra_bake::{
-    Array, Clock, Entry, Error, Hourly, Label, Layout, Moment, Orientation, Place, Placement,
-    Refraction, Sensors, SunFound, SunJob, SunValues, Sunlight, SunlightClass, TimeStep, UpAxis,
-    Weather, sun_positions,
+    Array, Clock, Entry, Error, Label, Layout, Moment, Orientation, Place, Placement, Refraction,
+    Sensors, SunFound, SunJob, SunValues, Sunlight, SunlightClass, TimeStep, UpAxis, Weather,
+    sun_positions,
 };
-use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
 use antumbra_raster::Quantity;
@@ -19,11 +17,12 @@ use super::chunks::{self, PartFile};
 use super::command::{Bake, Head};
 use super::files::{self, Format};
 use super::ground::{self, Ground};
+use super::hourly;
 use super::map::{self, Plan, Words};
 use super::raster;
 use crate::args::{Shown, SunArgs};
 use crate::exit::{Failure, say, tell};
-use crate::{input, interrupt, json, output};
+use crate::{input, interrupt, json};
 
 /// The JSON document.
 #[derive(Serialize)]
@@ -55,16 +54,16 @@ struct Document<'a> {
 }
 
 /// Everything that files are made of.
-struct Baked<'a> {
-    ground: &'a Ground,
-    sensors: &'a Sensors,
-    sunlight: &'a Sunlight,
-    found: &'a SunFound,
-    args: &'a SunArgs,
-    when: &'a When,
+pub struct Baked<'a> {
+    pub ground: &'a Ground,
+    pub sensors: &'a Sensors,
+    pub sunlight: &'a Sunlight,
+    pub found: &'a SunFound,
+    pub args: &'a SunArgs,
+    pub when: &'a When,
     /// Name of the weather.
-    weather: Option<&'a str>,
-    up: UpAxis,
+    pub weather: Option<&'a str>,
+    pub up: UpAxis,
 }
 
 /// Refuses outputs that cannot be made, before anything is read.
@@ -87,6 +86,9 @@ pub fn check(args: &SunArgs) -> Result<(), Failure> {
         check_day(args)?;
     }
     args.map.check()?;
+    args.hourly
+        .as_deref()
+        .map_or(Ok(()), |path| hourly::format(path).map(drop))?;
     if args.epw.is_none() && !matches!(args.show, Shown::Hours | Shown::SkyView) {
         return Err(Failure::Usage("--show: irradiation needs --epw".into()));
     }
@@ -559,49 +561,6 @@ impl Baked<'_> {
             }
             numbers
         })
-    }
-
-    /// Writes a line for each step of time, with a column for each sensor.
-    fn hourly(&self, path: &Path) -> Result<(), Failure> {
-        let _writing = interrupt::writing();
-        Format::of(path, &["csv"], "steps of time are written as csv")?;
-        let (sensors, found) = (self.sensors, self.found);
-        let hourly = Hourly::new(self.sunlight)?;
-        let cells = hourly.len() as u64 * sensors.points.len() as u64;
-        output::check_room(path, 4 * cells)?;
-        Ok(atomic_write(path, |file| {
-            let names = sensors.labels.iter().find(|label| label.column == "name");
-            let mut line = "time".to_owned();
-            for row in 0..sensors.points.len() {
-                let _ = match names {
-                    Some(names) => write!(line, ",{}", files::field(&names.values[row])),
-                    None => write!(line, ",{}", row + 1),
-                };
-            }
-            writeln!(file, "{line}")?;
-            for step in 0..hourly.len() {
-                line.clear();
-                let _ = write!(line, "{}", hourly.begin(step));
-                for row in 0..sensors.points.len() {
-                    let seen = (&found.suns_seen, &found.sky_seen, row);
-                    let normal = sensors.normals.get(row).copied();
-                    let value =
-                        hourly
-                            .receipt(step, seen, normal)
-                            .map(|receipt| match self.args.show {
-                                Shown::Hours => receipt.hours,
-                                Shown::Direct => receipt.direct,
-                                Shown::Diffuse => receipt.diffuse,
-                                Shown::Total => receipt.direct + receipt.diffuse,
-                                Shown::SkyView => found.values.sky_view[row],
-                            });
-                    let value = value.unwrap_or(f64::NAN);
-                    let _ = write!(line, ",{}", (value * 1e6).round() / 1e6);
-                }
-                writeln!(file, "{line}")?;
-            }
-            Ok(())
-        })?)
     }
 
     fn npz(&self, path: &Path) -> Result<(), Failure> {

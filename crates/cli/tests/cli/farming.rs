@@ -215,6 +215,89 @@ fn a_job_given_again_submits_what_is_missing() {
     assert!(code == Some(2) && told.contains("another job"), "{told}");
 }
 
+/// Runs the jobs that `farm slurm --dry-run` prints, as three tasks in the folder `parts`, of which one is lost in the middle of its
+/// work.
+fn run_on_many(place: &Place, slurm: &[&str]) {
+    let printed = place.run(slurm).expect(0).stdout;
+    let scripts: Vec<_> = printed.split("#!/usr/bin/env bash").skip(1).collect();
+    let [compute, merge] = scripts[..] else {
+        panic!("two scripts: {printed}");
+    };
+    let (compute, _) = compute.rsplit_once("\n# ").expect("a comment");
+    let (merge, _) = merge.split_once("\nsbatch ").expect("a command");
+    fs::create_dir(place.path("parts")).expect("a folder");
+    let bash = |script: &str, task: &str| {
+        let bash = Command::new("bash")
+            .args(["-c", script])
+            .current_dir(place.path("."))
+            .env("SLURM_ARRAY_TASK_ID", task)
+            .status();
+        assert!(bash.expect("bash").success(), "{script}");
+    };
+    // The machine of a task was lost in the middle of its work.
+    bash(compute, "1");
+    let part = fs::read(place.path("parts/1.part")).expect("a part");
+    fs::remove_file(place.path("parts/1.part")).expect("a file");
+    place.write("parts/1.unfinished.part", &part[..part.len() / 2]);
+    for task in ["0", "1", "2"] {
+        bash(compute, task);
+    }
+    bash(merge, "");
+}
+
+#[test]
+fn openness_and_viewsheds_on_many_machines_have_the_same_bytes() {
+    let place = Place::with_room();
+    let cells: Vec<String> = (0..40)
+        .map(|row| {
+            let heights = (0..50).map(|column| (row * 7 + column * column * 3) % 11);
+            let heights: Vec<String> = heights.map(|height| height.to_string()).collect();
+            heights.join(" ")
+        })
+        .collect();
+    let head = "ncols 50\nnrows 40\nxllcorner 600000\nyllcorner 5340000\ncellsize 10\n";
+    place.write("dem.asc", format!("{head}{}\n", cells.join("\n")));
+    // So many observers that there are chunks for each of three tasks.
+    let eyes: String = (0..9000)
+        .map(|eye| {
+            format!(
+                "{},{}\n",
+                600_010 + 7 * eye % 480,
+                5_340_010 + 13 * eye % 380
+            )
+        })
+        .collect();
+    place.write("eyes.csv", format!("x,y\n{eyes}"));
+    let program = env!("CARGO_BIN_EXE_antumbra");
+    let visible = ["eyes.csv", "--viewshed", "--eye", "3", "--curvature"];
+    let open = ["--samples", "1024", "--two-sided"];
+    for (scene, job, end, flags) in [
+        ("dem.asc", "visible", "tif", &visible[..]),
+        ("builtin:city:3000", "ao", "ply", &open),
+    ] {
+        let [one, all] = ["one", "all"].map(|name| format!("{name}.{end}"));
+        place
+            .run(&[&[job, scene], flags, &["-o", &one]].concat())
+            .expect(0);
+        let farm = [
+            "farm",
+            "slurm",
+            scene,
+            "--command",
+            job,
+            "-o",
+            &all,
+            "--tasks",
+            "3",
+        ];
+        let more = ["--folder", "parts", "--program", program, "--dry-run", "--"];
+        run_on_many(&place, &[&farm[..], &more, flags].concat());
+        let [one, all] = [one, all].map(|name| fs::read(place.path(&name)).expect("a file"));
+        assert!(one == all, "{job}");
+        fs::remove_dir_all(place.path("parts")).expect("a folder");
+    }
+}
+
 #[test]
 fn a_bake_on_many_machines_has_the_same_bytes() {
     let place = Place::with_room();
@@ -252,31 +335,7 @@ fn a_bake_on_many_machines_has_the_same_bytes() {
         &flags,
     ]
     .concat();
-    let printed = place.run(&slurm).expect(0).stdout;
-    let scripts: Vec<_> = printed.split("#!/usr/bin/env bash").skip(1).collect();
-    let [compute, merge] = scripts[..] else {
-        panic!("two scripts: {printed}");
-    };
-    let (compute, _) = compute.rsplit_once("\n# ").expect("a comment");
-    let (merge, _) = merge.split_once("\nsbatch ").expect("a command");
-    fs::create_dir(place.path("parts")).expect("a folder");
-    let bash = |script: &str, task: &str| {
-        let bash = Command::new("bash")
-            .args(["-c", script])
-            .current_dir(place.path("."))
-            .env("SLURM_ARRAY_TASK_ID", task)
-            .status();
-        assert!(bash.expect("bash").success(), "{script}");
-    };
-    // The machine of a task was lost in the middle of its work.
-    bash(compute, "1");
-    let part = fs::read(place.path("parts/1.part")).expect("a part");
-    fs::remove_file(place.path("parts/1.part")).expect("a file");
-    place.write("parts/1.unfinished.part", &part[..part.len() / 2]);
-    for task in ["0", "1", "2"] {
-        bash(compute, task);
-    }
-    bash(merge, "");
+    run_on_many(&place, &slurm);
     for end in ["csv", "npz"] {
         let [one, all] = ["one", "all"].map(|name| fs::read(place.path(&format!("{name}.{end}"))));
         assert_eq!(one.expect("a file"), all.expect("a file"), "{end}");

@@ -163,6 +163,24 @@ fn steps_of_time_add_up_to_the_sums() {
             .sum();
         assert!((total - sum).abs() < 1e-6, "{name}");
     }
+    // The same as arrays: the values of the day, one row after the other, as 32-bit floats.
+    place.sun_on(&["--sensors", "two.csv", "--hourly", "steps.npz"]);
+    let arrays = fs::read(place.path("steps.npz")).expect("arrays");
+    let wanted: Vec<u8> = (0..24)
+        .flat_map(|step| ["roof", "yard"].map(|name| (step, name)))
+        .flat_map(|(step, name)| {
+            let value = column(&place, "steps.csv", name)[step].parse::<f32>();
+            value.expect("a number").to_le_bytes()
+        })
+        .collect();
+    assert!(arrays.windows(wanted.len()).any(|bytes| bytes == wanted));
+    let bad = ["sun", "house.obj", "-o", "a.csv", "--hourly", "a.txt"];
+    let run = place.run(&[&bad[..], &["--grid", "1"], &DAY].concat());
+    assert!(
+        run.code == 2 && run.stderr.contains("csv or npz"),
+        "{}",
+        run.stderr
+    );
     assert_eq!(
         column(&place, "steps.csv", "time")[12],
         "2025-06-21T12:00:00"

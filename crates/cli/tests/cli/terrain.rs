@@ -144,6 +144,84 @@ fn a_viewshed_ends_at_the_wall_and_at_the_radius() {
 }
 
 #[test]
+fn cells_that_are_seen_are_the_same_in_all_files() {
+    let place = place();
+    // The last eye is below the surface.
+    place.write(
+        "eyes.csv",
+        "x,y,z\n600055,5339855,7\n600305,5339855,7\n600105,5339855,1\n",
+    );
+    let args = [
+        "visible",
+        "dem.tif",
+        "eyes.csv",
+        "--viewshed",
+        "--json",
+        "-",
+    ];
+    let files = [
+        "-o",
+        "seen.asc",
+        "-o",
+        "seen.csv",
+        "-o",
+        "seen.npz",
+        "-o",
+        "seen.ply",
+        "--lines",
+        "seen_lines.csv",
+    ];
+    let run = place.run(&[&args[..], &files].concat()).expect(0);
+    assert!(
+        run.stderr.contains("1 of 3 eyes are below the surface"),
+        "{}",
+        run.stderr
+    );
+    let raster = place.raster("seen.asc");
+    let cells: Vec<f64> = raster.values.into_iter().filter(|x| !x.is_nan()).collect();
+    assert_eq!(cells.len(), 1199, "one cell has no data");
+    let table = fs::read_to_string(place.path("seen.csv")).expect("a table");
+    assert!(
+        table.starts_with("x,y,z,seen_by\n600015,5339995,5,"),
+        "{table}"
+    );
+    let counts = table.lines().skip(1).map(|line| line.rsplit(',').next());
+    let counts: Vec<f64> = counts
+        .map(|count| count.expect("a count").parse().expect("a number"))
+        .collect();
+    assert_eq!(counts, cells);
+    let lines = fs::read_to_string(place.path("seen_lines.csv")).expect("a table");
+    assert_eq!(
+        (lines.lines().count() - 1) as f64,
+        cells.iter().sum::<f64>()
+    );
+    assert!(lines.lines().skip(1).all(|line| !line.starts_with('2')));
+    // Rays, which --margin takes, see the same of a wall.
+    let rays = [
+        "visible",
+        "dem.tif",
+        "eyes.csv",
+        "--viewshed",
+        "--margin",
+        "0.01",
+        "-o",
+        "rays.asc",
+    ];
+    place.run(&rays).expect(0);
+    let rays = place
+        .raster("rays.asc")
+        .values
+        .into_iter()
+        .filter(|x| !x.is_nan());
+    let differ = rays.zip(&cells).filter(|(a, b)| a != *b).count();
+    assert!(differ < 20, "{differ} cells differ");
+    for name in ["eyes.csv", "dem.asc"] {
+        let bad = ["visible", "dem.asc", "eyes.csv", "--viewshed", "-o", name];
+        assert_eq!(place.run(&bad).code, 2, "{name} would be lost");
+    }
+}
+
+#[test]
 fn what_cannot_be_placed_is_refused() {
     let place = place();
     place.write("off.csv", "x,y\n0,0\n");
