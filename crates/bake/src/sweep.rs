@@ -48,6 +48,8 @@ pub struct Sector<'a> {
     ends: [f64; 2],
     /// Whether cells on the diagonals between two sides count.
     has_diagonals: bool,
+    /// Lines from the eye from which on blocks may be left out.
+    far: f64,
 }
 
 /// A line of cells, of which some blocks are projected.
@@ -65,7 +67,8 @@ impl Cells {
     /// Points of a range of cells, as far as they are in reach.
     fn within(&self, range: &Range<usize>) -> (usize, &[Point]) {
         let end = self.first + self.points.len();
-        let [from, to] = [range.start, range.end].map(|at| at.clamp(self.first, end));
+        let from = range.start.clamp(self.first, end);
+        let to = range.end.clamp(from, end);
         (from, &self.points[from - self.first..to - self.first])
     }
 }
@@ -82,6 +85,7 @@ impl<'a> Sector<'a> {
             range: job.range,
             ends: [end(index), end(index + 1)],
             has_diagonals: matches!(side, Side::East | Side::West),
+            far: FAR,
         }
     }
 
@@ -165,7 +169,7 @@ impl<'a> Sector<'a> {
             return;
         }
         let x = cells.line as f64 - self.view.eye[0];
-        if !has_before || x <= FAR {
+        if !has_before || x <= self.far {
             spans.push(reach);
             return;
         }
@@ -357,5 +361,68 @@ impl<'a> Sector<'a> {
 
     fn is_near(&self, x: f64, y: f64) -> bool {
         self.range == f64::INFINITY || self.view.squared(x, y) <= self.range * self.range
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use antumbra_testkit::Rng;
+
+    use super::*;
+    use crate::HeightField;
+
+    #[test]
+    fn blocks_that_are_left_out_change_nothing() {
+        for seed in 0..20 {
+            let mut rng = Rng::new(seed);
+            let mut random = || f64::from(rng.unit());
+            let size = [
+                20 + (280.0 * random()) as usize,
+                20 + (280.0 * random()) as usize,
+            ];
+            let (rough, holes) = (3.0 * random(), 0.05 * random());
+            let heights: Vec<f64> = (0..size[0] * size[1])
+                .map(|cell| {
+                    let [x, y] = [(cell % size[0]) as f64, (cell / size[0]) as f64];
+                    let wave = 9.0 * (x / 17.0).sin() * (y / 23.0).cos();
+                    match seed % 3 == 0 && random() < holes {
+                        true => f64::NAN,
+                        false => wave + rough * random(),
+                    }
+                })
+                .collect();
+            let field = HeightField::new(size, &heights, [0.0, 1.0, 0.2, 0.0, 0.0, -1.5]);
+            let field = field.expect("a field");
+            let job = ViewshedJob {
+                field: &field,
+                observers: &[],
+                target: if seed % 2 == 0 { 0.0 } else { 1.0 },
+                drop: 1e-4 * random(),
+                range: if seed % 5 == 0 { 90.0 } else { f64::INFINITY },
+            };
+            for _ in 0..6 {
+                let [x, y] = size.map(|size| (1.4 * random() - 0.2) * size as f64);
+                let observer = Observer {
+                    place: field.place([x + 0.2 * y, -1.5 * y]),
+                    height: 12.0 + 10.0 * random(),
+                    normal: [0.0; 3],
+                };
+                for side in Side::ALL {
+                    for index in 0..SECTORS {
+                        let mut sector = Sector::new(&job, &observer, side, index);
+                        let found = sector.sweep();
+                        sector.far = f64::INFINITY;
+                        let all = sector.sweep();
+                        let cells = |runs: &[Run]| {
+                            let cells = runs
+                                .iter()
+                                .flat_map(|(line, run)| run.clone().map(move |at| (*line, at)));
+                            cells.collect::<Vec<_>>()
+                        };
+                        assert_eq!(cells(&found), cells(&all), "seed {seed}, {observer:?}");
+                    }
+                }
+            }
+        }
     }
 }

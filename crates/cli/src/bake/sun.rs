@@ -60,7 +60,7 @@ pub struct Baked<'a> {
     pub sunlight: &'a Sunlight,
     pub found: &'a SunFound,
     pub args: &'a SunArgs,
-    pub when: &'a When,
+    when: &'a When,
     /// Name of the weather.
     pub weather: Option<&'a str>,
     pub up: UpAxis,
