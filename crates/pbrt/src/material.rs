@@ -250,10 +250,11 @@ fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report)
 /// Matte in the place of an unknown material, as in pbrt-v3.
 fn unknown(other: &str, at: Span, values: &mut Textured) -> Material {
     let mistake = format!("unknown material {other:?}");
-    let help = || {
-        let known = [SUPPORTED, version4::SUPPORTED].concat();
-        suggest::help(other, &known)
+    let known = match values.report.is_version4 {
+        true => [SUPPORTED, version4::SUPPORTED].concat(),
+        false => SUPPORTED.to_vec(),
     };
+    let help = || suggest::help(other, &known);
     values
         .report
         .tolerated(at, mistake, "\"matte\" is taken", help);

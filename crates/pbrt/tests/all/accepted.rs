@@ -2,8 +2,8 @@
 
 use antumbra_pbrt::Severity;
 use antumbra_scene::{
-    Accelerator, DirectStrategy, Filter, Geometry, Integrator, Light, LightStrategy, Material, Rgb,
-    SamplerKind, Shape, TriangleMesh,
+    Accelerator, DirectStrategy, Filter, Geometry, Integrator, Light, LightStrategy, Material,
+    Projection, Rgb, SamplerKind, Shape, TriangleMesh,
 };
 use glam::{Mat4, Vec3};
 
@@ -659,4 +659,18 @@ fn subdivided_meshes_are_smooth() {
         assert!(position.normalize().dot(*normal) < -0.9);
         assert!((0.3..0.6).contains(&position.length()));
     }
+}
+
+#[test]
+fn cameras_without_a_vanishing_point() {
+    let camera = |text: &str| scene(&format!("{text} WorldBegin WorldEnd")).camera;
+    let plain =
+        camera(r#"Camera "orthographic" "float screenwindow" [-2 2 -1 1] "float lensradius" .1"#);
+    assert_eq!(plain.projection, Projection::Orthographic);
+    assert_eq!(plain.screen_window, Some([-2.0, 2.0, -1.0, 1.0]));
+    assert_eq!(plain.lens_radius, 0.1);
+    let around = camera(r#"Camera "environment""#);
+    assert_eq!(around.projection, Projection::Spherical);
+    let square = scene(r#"Film "rgb" Camera "spherical" WorldBegin"#).camera;
+    assert_eq!(square.projection, Projection::EqualArea);
 }

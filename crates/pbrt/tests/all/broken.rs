@@ -81,7 +81,7 @@ WorldBegin WorldEnd"#, r#"16 numbers in [ ]"#),
         // Names.
         (r#"Sampler ›"magic" WorldBegin WorldEnd"#, r#"known: 02sequence, halton"#),
         (r#"Integrator ›"paht" WorldBegin WorldEnd"#, r#"did you mean "path""#),
-        (r#"Camera ›"orthographic" WorldBegin WorldEnd"#, r#"not supported yet"#),
+        (r#"Camera ›"realistic" WorldBegin WorldEnd"#, r#"not supported yet"#),
         (r#"Accelerator "qbvh" "string order" ›"random" WorldBegin WorldEnd"#, r#"known: simple, sort+"#),
         (r#"Accelerator "bvh" ›"string order" "simple" WorldBegin WorldEnd"#, r#"no parameter "order""#),
         (r#"WorldBegin Material "hair" ›Shape "sphere" WorldEnd"#, r#"hair on other shapes"#),
@@ -269,7 +269,7 @@ fn a_file_that_is_no_text_is_one_mistake() {
 
 #[test]
 fn kinds_that_are_not_supported_come_with_those_that_are() {
-    let text = "Camera \"environment\"\nWorldBegin\nIdentity\nShape \"cone\"\nWorldEnd";
+    let text = "Camera \"realistic\"\nWorldBegin\nIdentity\nShape \"cone\"\nWorldEnd";
     let diagnostics = complaints(load_text(text));
     for (line, words) in [(1, "perspective"), (4, "disk")] {
         let help = diagnostics.iter().find(|d| d.line == line);
