@@ -137,13 +137,13 @@ pub(crate) fn say(file: u32, report: &mut Report) {
     if report.error_count() > 0 {
         report.error_help(
             start,
-            "this is a scene of pbrt-v4, of which only what means the same in pbrt-v3 is read",
-            "what is named below does not map; docs/src/pbrt-support.md has the list",
+            "this is a scene of pbrt-v4, of which not everything is read",
+            "errors name what is not read; docs/src/pbrt-support.md has the list",
         );
     } else {
         report.note(
             start,
-            "this is a scene of pbrt-v4, read by what means the same in pbrt-v3",
+            "this is a scene of pbrt-v4; docs/src/pbrt-support.md lists what differs",
         );
     }
 }
