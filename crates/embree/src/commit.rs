@@ -156,9 +156,9 @@ impl Committed {
         });
         for (geometry, _) in instanced {
             for scene in geometry.state().scenes.iter().flatten() {
-                let now = scene.committed().ok().map(std::ptr::from_ref);
-                let is_known = |object: &Arc<Self>| Some(Arc::as_ptr(object)) == now;
-                if now.is_some() && !self.objects.iter().any(is_known) {
+                let now = scene.committed_address();
+                let is_known = |object: &Arc<Self>| Arc::as_ptr(object) == now;
+                if !now.is_null() && !self.objects.iter().any(is_known) {
                     return false;
                 }
             }

@@ -19,8 +19,11 @@ pub struct Scene {
     state: Mutex<State>,
     /// A reference to what queries use; null before the first commit.
     committed: AtomicPtr<Committed>,
-    /// Held during a commit. Has the commit before the last one, which a query that should have ended may still use.
-    commit: Mutex<Option<Arc<Committed>>>,
+    /// Held during a commit.
+    commit: Mutex<()>,
+    /// The commit before the last one, which a query that should have ended may still use. Held for moments only, and no other
+    /// lock is taken meanwhile: scenes may be instances of each other.
+    retired: Mutex<Option<Arc<Committed>>>,
 }
 
 impl Handle for Scene {
@@ -72,9 +75,14 @@ impl Scene {
             .ok_or_else(|| Failure::operation("scene not committed"))
     }
 
+    /// Address of what queries use, to compare; null before the first commit.
+    pub fn committed_address(&self) -> *const Committed {
+        self.committed.load(Ordering::Acquire)
+    }
+
     /// What queries use, as a reference of its own.
     pub fn committed_arc(&self) -> Option<Arc<Committed>> {
-        let _held = lock(&self.commit);
+        let _held = lock(&self.retired);
         let pointer = self.committed.load(Ordering::Acquire).cast_const();
         if pointer.is_null() {
             return None;
@@ -92,7 +100,7 @@ impl Scene {
     }
 
     fn commit(&self) -> Outcome {
-        let mut retired = lock(&self.commit);
+        let _held = lock(&self.commit);
         let (plan, was_modified) = {
             let mut state = lock(&self.state);
             let plan = Plan {
@@ -112,9 +120,14 @@ impl Scene {
         match plan.commit(self) {
             Ok(committed) => {
                 let new = Arc::into_raw(Arc::new(committed)).cast_mut();
+                let mut retired = lock(&self.retired);
                 let old = self.committed.swap(new, Ordering::AcqRel);
                 // SAFETY: the pointer came from `into_raw` here.
-                *retired = (!old.is_null()).then(|| unsafe { Arc::from_raw(old) });
+                let old = (!old.is_null()).then(|| unsafe { Arc::from_raw(old) });
+                let last = std::mem::replace(&mut *retired, old);
+                // What is dropped may call the monitor of memory, and may be the last holder of other scenes.
+                drop(retired);
+                drop(last);
                 Ok(())
             }
             Err(failure) => {
@@ -165,6 +178,7 @@ pub unsafe extern "C" fn rtcNewScene(device: *const Device) -> *const Scene {
                 }),
                 committed: AtomicPtr::default(),
                 commit: Mutex::default(),
+                retired: Mutex::default(),
             })))
         })
     }

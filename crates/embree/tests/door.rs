@@ -16,7 +16,14 @@ fn a_client_in_c_finds_what_it_expects() {
     std::os::unix::fs::symlink(&library, folder.path().join("libembree4.so.4")).expect("a link");
     let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
     let compiled = Command::new(compiler)
-        .args(["-std=c11", "-O1", "-Wall", "-Wextra", "-Werror"])
+        .args([
+            "-std=gnu11",
+            "-pthread",
+            "-O1",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+        ])
         .args([&source, &library])
         .arg("-o")
         .arg(&program)

@@ -1,11 +1,13 @@
 /* Calls the library as a client of Embree does, with declarations of its own. Exits with 0 if all is right. */
 #include <math.h>
+#include <pthread.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 typedef struct { _Alignas(16) float org[3]; float tnear, dir[3], time, tfar; unsigned mask, id, flags; } Ray;
 typedef struct { _Alignas(16) float ng[3]; float u, v; unsigned prim, geom, inst, inst_prim; } Hit;
@@ -279,6 +281,42 @@ static void errors(void *device) {
     CHECK(rtcNewDevice("no_such_setting=1") == NULL && rtcGetDeviceError(NULL) == 2);
 }
 
+static void *commit_often(void *scene) {
+    for (int i = 0; i < 300; ++i) { rtcSetSceneFlags(scene, i % 2 ? 4 : 0); rtcCommitScene(scene); }
+    return NULL;
+}
+
+/* Two scenes that are instances of each other, committed from two threads: each commit ends, with or without an error. */
+static void each_other(void *device) {
+    void *scenes[2], *made[2];
+    pthread_t thread;
+    for (int i = 0; i < 2; ++i) {
+        void *geometry = mesh(device, 10);
+        scenes[i] = rtcNewScene(device);
+        rtcAttachGeometry(scenes[i], geometry);
+        rtcReleaseGeometry(geometry);
+        rtcCommitScene(scenes[i]);
+    }
+    for (int i = 0; i < 2; ++i) {
+        made[i] = rtcNewGeometry(device, 121);
+        rtcSetGeometryInstancedScene(made[i], scenes[1 - i]);
+        rtcCommitGeometry(made[i]);
+        rtcAttachGeometry(scenes[i], made[i]);
+    }
+    CHECK(rtcGetDeviceError(device) == 0);
+    alarm(120);
+    CHECK(pthread_create(&thread, NULL, commit_often, scenes[0]) == 0);
+    commit_often(scenes[1]);
+    pthread_join(thread, NULL);
+    alarm(0);
+    rtcGetDeviceError(device);
+    for (int i = 0; i < 2; ++i) {
+        rtcDetachGeometry(scenes[i], 1);
+        rtcReleaseGeometry(made[i]);
+    }
+    for (int i = 0; i < 2; ++i) rtcReleaseScene(scenes[i]);
+}
+
 int main(void) {
     void *device = rtcNewDevice("threads=2,isa=avx2");
     CHECK(device != NULL);
@@ -287,6 +325,7 @@ int main(void) {
     masks_filters_instances(device);
     user_geometry_and_points(device);
     CHECK(rtcGetDeviceError(device) == 0);
+    each_other(device);
     errors(device);
     rtcReleaseDevice(device);
     puts("door: ok");
