@@ -30,7 +30,7 @@ pub struct BenchArgs {
         value_name = "LIST",
         help_heading = heading::TREE,
         help = "Child orders, see `antumbra list`",
-        long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one. If absent: that of the preset.")
+        long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one. If absent: the choice of the preset.")
     )]
     pub orders: Option<Orders>,
     #[command(flatten)]

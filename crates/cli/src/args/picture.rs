@@ -22,7 +22,7 @@ pub struct PictureArgs {
         value_name = "I",
         help = "Integrator, by pbrt's name [default: the scene's]",
         long_help = help_one("Integrator", &integrators(),
-            "If the scene asks for the same one, its settings are kept; otherwise they are pbrt-v3's defaults. \
+            "If the scene has the same one, its settings are kept; otherwise they are pbrt-v3's defaults. \
              ambientocclusion is 0 to 1 for a mesh, and 0 to pi for a .pbrt scene. If absent: the scene's."),
         value_parser = one_of::<IntegratorKind>(integrators()), hide_possible_values = true)]
     pub integrator: Option<IntegratorKind>,

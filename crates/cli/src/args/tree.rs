@@ -23,7 +23,7 @@ pub struct TreeArgs {
         hide_possible_values = true,
         help = "Child order, see `antumbra list orders`",
         long_help = help_one("Child order of shadow rays", &names::orders(),
-            "If absent: what the scene asks for, or that of the preset.")
+            "If absent: the choice of the scene, or of the preset.")
     )]
     pub order: Option<Order>,
     #[command(flatten)]
@@ -35,7 +35,7 @@ pub struct TreeArgs {
         hide_possible_values = true,
         help = "Collapse of the binary tree",
         long_help = help_one("How the binary tree is made wide", &names::collapses(),
-            "Collapses that learn are given surface rays and the scene's own shadow rays. If absent: that of the preset.")
+            "Collapses that learn are given surface rays and the scene's own shadow rays. If absent: the choice of the preset.")
     )]
     pub collapse: Option<Collapse>,
     #[arg(
@@ -45,7 +45,7 @@ pub struct TreeArgs {
         hide_possible_values = true,
         help = "Children per node",
         long_help = help_one("Children per node", &names::widths(),
-            "auto is what suits the instruction set. If absent: what the scene asks for, or auto.")
+            "auto is what suits the instruction set. If absent: the choice of the scene, or auto.")
     )]
     pub width: Option<WidthChoice>,
     #[command(flatten)]
@@ -81,7 +81,7 @@ pub struct BuilderArgs {
         help = "Builder of the binary tree",
         long_help = help_one("Builder of the binary tree", &names::builders(),
             "Builders that are driven by rays are given the scene's own shadow rays, or surface rays where there are none. \
-             If absent: that of the preset.")
+             If absent: the choice of the preset.")
     )]
     pub builder: Option<Builder>,
 }
@@ -96,7 +96,7 @@ pub struct CollapsesArgs {
         help_heading = heading::TREE,
         help = "Collapses of the binary tree, or all",
         long_help = help_list("How the binary tree is made wide", &names::collapses(),
-            "all is every one. Collapses that learn are given the training rays and surface rays. If absent: that of the \
+            "all is every one. Collapses that learn are given the training rays and surface rays. If absent: the choice of the \
              preset.")
     )]
     pub collapses: Option<Collapses>,
