@@ -13,7 +13,7 @@ use super::{MachineArgs, PictureArgs, SCENE, SCENE_LONG, heading};
 use crate::json::Destination;
 
 /// Note on trees and collapses.
-const BASE: &str = "The default one, or else the first, is the one of the renderings by all orders.";
+const BASE: &str = "The default one, or else the first, renders all orders.";
 
 /// Flags of `study`.
 #[derive(Debug, Args)]

@@ -43,7 +43,12 @@ fn has_anchor(page: &str, anchor: &str) -> bool {
 
 #[test]
 fn links_lead_to_files_and_headings() {
-    let outside = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "ARCHITECTURE.md"];
+    let outside = [
+        "README.md",
+        "CHANGELOG.md",
+        "CONTRIBUTING.md",
+        "ARCHITECTURE.md",
+    ];
     let mut all: Vec<_> = outside.map(|name| root().join(name)).into();
     pages(&root().join("docs"), &mut all);
     let book = root().join("docs/src");
@@ -93,7 +98,11 @@ fn the_summary_lists_every_page_of_the_book() {
     for page in &all {
         assert!(listed.contains(page), "{}", page.display());
     }
-    assert_eq!(listed.len(), all.len(), "a page is listed twice or is missing");
+    assert_eq!(
+        listed.len(),
+        all.len(),
+        "a page is listed twice or is missing"
+    );
 }
 
 /// Pages that are longer than the others may be: evidence, lists that are made from the program, and guides still to be divided.
@@ -119,7 +128,11 @@ fn pages_have_at_most_1500_words() {
         let words = std::fs::read_to_string(&page).expect("a page");
         let words = words.split_whitespace().count();
         let is_long = LONG.iter().any(|name| page == source.join(name));
-        assert!(is_long || words <= 1500, "{}: {words} words", page.display());
+        assert!(
+            is_long || words <= 1500,
+            "{}: {words} words",
+            page.display()
+        );
     }
 }
 
