@@ -3,6 +3,14 @@
 /// An axis-aligned box, closed on all sides. `min > max` on any axis means empty.
 ///
 /// Coordinates are not checked. Where one is NaN, comparisons with it count as false.
+///
+/// ```
+/// use antumbra::Aabb;
+///
+/// let house = Aabb::around(&[[0.0, 0.0, 0.0], [4.0, 2.0, 3.0]]);
+/// assert_eq!(house.half_area(), 4.0 * 2.0 + 2.0 * 3.0 + 3.0 * 4.0);
+/// assert_eq!(house.union(&Aabb::EMPTY), house);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb {
     /// Smallest coordinates.
