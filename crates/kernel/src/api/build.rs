@@ -43,6 +43,18 @@ pub struct Build<'a> {
 
 /// Geometry of a build: a list of geometries, whose place in the list is their `geom_id`, or primitives that are checked
 /// already.
+///
+/// ```
+/// use antumbra::{Bvh, Geometry, Primitives, Recipe};
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// let checked = Primitives::new(&geometry)?;
+/// // Several trees over primitives that were checked once.
+/// let (fast, best) = (Bvh::build(&checked, &Recipe::fast())?, Bvh::build(&checked, &Recipe::default())?);
+/// assert_eq!(fast.bounds(), best.bounds());
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Source<'a> {
@@ -196,6 +208,16 @@ impl Bvh {
     /// Builds a tree over geometries and learns it from surface rays: short for
     /// `Build::new(geometries).recipe(recipe).bvh()`. The place of a geometry in the list is its `geom_id`.
     ///
+    /// ```
+    /// use antumbra::{Bvh, Geometry, Recipe};
+    ///
+    /// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// let bvh = Bvh::build(&geometry, &Recipe::default())?;
+    /// assert_eq!(bvh.report().primitives, 1);
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// A vertex index out of range; more primitives than can be numbered.
     pub fn build<'a>(source: impl Into<Source<'a>>, recipe: &Recipe) -> Result<Self, Error> {
@@ -204,6 +226,16 @@ impl Bvh {
 
     /// Builds a tree over geometries and learns it from `rays`, a few thousand rays like those to come: short for
     /// `Build::new(geometries).rays(rays).recipe(recipe).bvh()`.
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
+    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// let sample = [Ray::between([0.2, 0.2, 0.0], [0.2, 0.2, 2.0])];
+    /// let bvh = Bvh::learn(&geometry, &sample, &Recipe::default())?;
+    /// assert!(bvh.occluded(&sample[0]));
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
     ///
     /// # Errors
     /// A vertex index out of range; more primitives than can be numbered.
