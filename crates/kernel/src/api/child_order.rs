@@ -133,6 +133,19 @@ impl Bvh {
     /// Takes about a hundred times as long as tracing the rays, on the calling thread: some ten milliseconds for a few
     /// thousand. Rays of the last frames are a good sample, see [`RayMemory`](crate::RayMemory). Without rays an order that
     /// [learns](crate::recipe::Order::learns) changes nothing, and [`Order::Simple`](crate::recipe::Order::Simple) never does.
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
+    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// # let mut bvh = Bvh::build(&geometry, &Recipe::default())?;
+    /// let rays = [Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]); 100];
+    /// let order = bvh.relearn(&rays, &Recipe::default());
+    /// let mut copy = bvh.clone();
+    /// copy.adopt(&order);
+    /// assert!(copy.occluded(&rays[0]));
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
     pub fn relearn(&mut self, rays: &[Ray], recipe: &Recipe) -> ChildOrder {
         self.relearn_from(0, rays, recipe)
     }
