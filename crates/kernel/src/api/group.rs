@@ -27,6 +27,13 @@ const MOST_POINTS: usize = 1 << 12;
 ///
 /// Directions are sorted along a curve over the sphere, so that rays of neighbouring directions go through the tree together.
 /// Results are in the order given.
+///
+/// ```
+/// use antumbra::Directions;
+///
+/// let suns = Directions::new(&[[0.0, 0.0, 1.0], [0.5, 0.0, 0.5]]);
+/// assert_eq!(suns.len(), 2);
+/// ```
 #[derive(Clone)]
 pub struct Directions {
     given: Vec<[f32; 3]>,
