@@ -17,6 +17,19 @@ use crate::trace::visit::Visit;
 const CHUNK: usize = 1 << 10;
 
 /// Hits of many rays, one list after the other: those of ray `i` are `hits[splits[i]..splits[i + 1]]`.
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Recipe};
+/// use antumbra::Ray;
+///
+/// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// let rays = [[0.2, 0.2, 0.0], [5.0, 5.0, 0.0]].map(|from| Ray::new(from, [0.0, 0.0, 1.0]));
+/// let lists = bvh.batch(&rays).all_hits();
+/// assert_eq!((lists.of(0).len(), lists.of(1).len()), (1, 0));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct HitLists {
