@@ -16,6 +16,20 @@ use crate::tree::words::{Kind, Sink, Words};
 /// Geometry with its tree, built once and placed in any number of [worlds](crate::World), any number of times.
 ///
 /// Can be shared among threads, by an `Arc` for example.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use antumbra::{Geometry, Instance, Object, Ray, Recipe, World};
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// let object = Arc::new(Object::build(&geometry, &Recipe::default())?);
+/// let five_along_x = Instance::new(0, [[1.0, 0.0, 0.0, 5.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
+/// let world = World::new(&[object], &[five_along_x])?;
+/// assert!(world.bvh().occluded(&Ray::new([5.2, 0.2, 0.0], [0.0, 0.0, 1.0])));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone)]
 pub struct Object {
     bvh: Bvh,
