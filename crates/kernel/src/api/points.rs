@@ -25,6 +25,18 @@ const CHUNK: usize = 64;
 ///
 /// Of several primitives at equal distance the one of the smallest (inst_id, geom_id, prim_id) is nearest, as with
 /// [`Hit`](crate::Hit).
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Recipe};
+/// use antumbra::ClosestPoint;
+///
+/// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// let near: ClosestPoint = bvh.closest([0.25, 0.25, 3.0], 10.0).expect("a triangle within 10");
+/// assert_eq!((near.distance, near.position, near.prim_id), (2.0, [0.25, 0.25, 1.0], 0));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct ClosestPoint {
@@ -135,6 +147,16 @@ impl Bvh {
     /// All primitives at a distance of at most `radius`, each once, the nearest first and at equal distances by (inst_id,
     /// geom_id, prim_id). Empty for a point with a NaN or infinite coordinate, and for a radius that is NaN or negative.
     ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Recipe};
+    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+    /// assert_eq!(bvh.within([0.0, 0.0, 0.0], 1.5).len(), 1);
+    /// assert!(bvh.within([0.0, 0.0, 0.0], 0.5).is_empty());
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
+    ///
     /// # Panics
     /// As [`Bvh::closest`].
     #[must_use]
@@ -212,6 +234,14 @@ impl Bvh {
     /// geometry leave out what they share. For surfaces with holes the answer means little.
     ///
     /// An instance counts for points inside its box.
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Recipe, Sphere};
+    /// let ball = [Geometry::spheres(vec![Sphere { center: [0.0; 3], radius: 2.0 }])];
+    /// let bvh = Bvh::build(&ball, &Recipe::default())?;
+    /// assert!(bvh.contains([1.0, 0.0, 0.0]) && !bvh.contains([3.0, 0.0, 0.0]));
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
     #[must_use]
     pub fn contains(&self, point: impl Into<[f32; 3]>) -> bool {
         self.around(point.into()).is_inside
