@@ -8,6 +8,17 @@ use crate::ray::Ray;
 /// A fair sample of the rays of many batches: each ray that was shown is in it with the same chance.
 ///
 /// Keeps at most so many rays, 32 bytes each. The sample depends on the rays, on their order and on nothing else.
+///
+/// ```
+/// use antumbra::{Ray, RayMemory};
+///
+/// let mut sample = RayMemory::new(100);
+/// for frame in 0..50 {
+///     let rays: Vec<Ray> = (0..1000).map(|i| Ray::new([i as f32, frame as f32, 0.0], [0.0, 0.0, 1.0])).collect();
+///     sample.show(&rays);
+/// }
+/// assert_eq!(sample.rays().len(), 100);
+/// ```
 #[derive(Clone, Debug)]
 pub struct RayMemory {
     rays: Vec<Ray>,
