@@ -13,6 +13,19 @@ use crate::trace::ray_sort::Grid;
 use crate::tree::any::on_tree;
 
 /// Order in which the rays of a batch are traced. Answers, and their places, are the same.
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Recipe};
+/// use antumbra::{Ray, RayOrder};
+///
+/// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// let rays = [Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]); 4];
+/// let blocked = bvh.batch(&rays).order(RayOrder::ByRule).occluded();
+/// assert_eq!(blocked, [true; 4]);
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RayOrder {
