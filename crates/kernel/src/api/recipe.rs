@@ -48,6 +48,13 @@ pub struct Recipe {
 }
 
 /// What a tree learns from, beside the rays that are given.
+///
+/// ```
+/// use antumbra::Recipe;
+///
+/// let training = Recipe::default().surface_rays(Some(1000)).seed(7).training;
+/// assert_eq!((training.surface_rays, training.seed), (Some(1000), 7));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Training {
@@ -61,6 +68,15 @@ pub struct Training {
 }
 
 /// Which rays a tree learns from.
+///
+/// ```
+/// use antumbra::Recipe;
+/// use antumbra::recipe::TrainingRays;
+///
+/// // For rays of one kind only: the tree may be slow for others.
+/// let recipe = Recipe::default().training_rays(TrainingRays::Given);
+/// assert_eq!(recipe.training.rays, TrainingRays::Given);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum TrainingRays {
@@ -76,6 +92,14 @@ pub enum TrainingRays {
 
 named_list! {
     /// Named recipes.
+    ///
+    /// ```
+    /// use antumbra::recipe::{Builder, Preset};
+    ///
+    /// let preset: Preset = "fast".parse()?;
+    /// assert_eq!(preset.recipe().builder, Builder::BinnedSah);
+    /// # Ok::<(), antumbra::recipe::UnknownName>(())
+    /// ```
     #[derive(Default)]
     pub enum Preset("preset"): fn() -> Recipe {
         #[default]
