@@ -19,6 +19,19 @@ impl Bvh {
     /// of it. After a refit each of these boxes is around the whole triangle, so such a tree loses more than others.
     /// Filters of cut-outs stay those of the build.
     ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
+    /// let mut positions = vec![[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// let mut bvh = Bvh::build(&[Geometry::triangles(&positions[..], vec![[0, 1, 2]])], &Recipe::default())?;
+    /// for position in &mut positions {
+    ///     position[2] += 2.0;
+    /// }
+    /// bvh.refit(&[Geometry::triangles(&positions[..], vec![[0, 1, 2]])])?;
+    /// let hit = bvh.intersect(&Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]));
+    /// assert_eq!(hit.map(|hit| hit.t), Some(3.0));
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// The tree stays as it is when
     /// - a vertex index is out of range,
