@@ -6,6 +6,18 @@ use crate::tree::any::on_tree;
 use crate::tree::costs::CostModel;
 
 /// What was built.
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Recipe};
+/// use antumbra::BuildReport;
+///
+/// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// let report: BuildReport = bvh.report();
+/// assert_eq!((report.primitives, report.dropped, report.depth), (1, 0, 1));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct BuildReport {
