@@ -19,6 +19,21 @@ use crate::tree::wide::WideTree;
 use crate::tree::words::{self, Kind, Sink, Words};
 
 /// What a file can hold: a [`Bvh`], an [`Object`] or a [`World`]. [`Functions::read`] returns any of them.
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Recipe};
+/// use antumbra::{Error, Functions, Saved};
+///
+/// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// fn load<T: Saved>(bytes: &[u8]) -> Result<T, Error> {
+///     Functions::new().from_bytes(bytes)
+/// }
+/// let again: Bvh = load(&bvh.to_bytes())?;
+/// assert_eq!(again.bounds(), bvh.bounds());
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 pub trait Saved: Contents {}
 
 impl<T: Contents> Saved for T {}
@@ -95,6 +110,18 @@ impl Bvh {
     /// Files are not trusted. A wrong checksum is an error, and so is a file with a right one whose tree would let a query
     /// panic or run for ever, or has boxes that do not hold what is below them. Nothing checks that the geometry is the one
     /// that you saved: [`Bvh::validate`] finds primitives that somebody put in twice. Memory grows with the bytes that are read.
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
+    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+    /// let mut file = Vec::new();
+    /// bvh.write(&mut file)?;
+    /// let again = Bvh::read(&file[..])?;
+    /// assert_eq!(again.bounds(), bvh.bounds());
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
     ///
     /// # Errors
     /// [`Error::Unreadable`] with what is wrong, [`Error::OtherFunctions`] if the tree needs [`Functions`], [`Error::Io`] if
