@@ -24,6 +24,17 @@ const ITEMS: usize = 512;
 impl Bvh {
     /// Whether anything lies in the ray's interval. May be called from any number of threads at once; the traversal stack
     /// lies on the program stack of the caller.
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
+    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+    /// assert!(bvh.occluded(&Ray::between([0.2, 0.2, 0.0], [0.2, 0.2, 2.0])));
+    /// // The interval is open: the triangle is at its end.
+    /// assert!(!bvh.occluded(&Ray::between([0.2, 0.2, 0.0], [0.2, 0.2, 1.0])));
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
         if self.rule() == &Rule::Slots {
@@ -38,6 +49,17 @@ impl Bvh {
 
     /// The closest hit in the ray's interval; at equal distances the smallest (inst_id, geom_id, prim_id). May be called
     /// from any number of threads at once, as [`Bvh::occluded`].
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
+    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+    /// let ray = Ray::new([0.25, 0.25, 0.0], [0.0, 0.0, 2.0]);
+    /// let hit = bvh.intersect(&ray).expect("a triangle above");
+    /// assert_eq!((hit.t, ray.at(hit.t)), (0.5, [0.25, 0.25, 1.0]));
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         self.one::<Closest>(ray)
@@ -52,6 +74,17 @@ impl Bvh {
     /// Finds the primitive by its ids along the ray, which takes about as long as a query of one ray. `None` if the ray comes by
     /// no such primitive, if the three corners lie on a line, or if user
     /// geometry tells none.
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
+    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+    /// let ray = Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
+    /// let hit = bvh.intersect(&ray).expect("a triangle above");
+    /// assert_eq!(bvh.normal(&ray, &hit), Some([0.0, 0.0, 1.0]));
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
     #[must_use]
     pub fn normal(&self, ray: &Ray, hit: &Hit) -> Option<[f32; 3]> {
         let located = self.with_stack(
