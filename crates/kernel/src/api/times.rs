@@ -6,6 +6,23 @@ use core::time::Duration;
 pub type Clock = fn() -> Duration;
 
 /// How long the steps of [`Bvh::learn`](crate::Bvh::learn) took.
+///
+/// ```
+/// use std::sync::LazyLock;
+/// use std::time::{Duration, Instant};
+///
+/// use antumbra::recipe::Clock;
+/// use antumbra::{Bvh, Geometry, Recipe};
+///
+/// static START: LazyLock<Instant> = LazyLock::new(Instant::now);
+/// let clock: Clock = || START.elapsed();
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// let bvh = Bvh::build(&geometry, &Recipe::default().clock(Some(clock)))?;
+/// let times = bvh.report().times.expect("a clock was given");
+/// assert!(times.total() > Duration::ZERO);
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct BuildTimes {
