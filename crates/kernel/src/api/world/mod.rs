@@ -154,6 +154,20 @@ impl World {
     /// Replaces the list of instances: some may have moved, some be new, some be gone. The place in the list is the
     /// `inst_id`. Instances that are as they were at the same place cost least.
     ///
+    /// ```
+    /// # use std::sync::Arc;
+    /// # use antumbra::{Geometry, Instance, Object, Ray, Recipe, World};
+    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// # let object = Arc::new(Object::build(&geometry, &Recipe::default())?);
+    /// let at = |x| Instance::new(0, [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
+    /// let mut world = World::new(&[object], &[at(0.0)])?;
+    /// world.set_instances(&[at(5.0), at(9.0)])?;
+    /// let hit = world.bvh().intersect(&Ray::new([9.2, 0.2, 0.0], [0.0, 0.0, 1.0]));
+    /// assert_eq!(hit.map(|hit| hit.inst_id), Some(1));
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
+    ///
     /// # Errors
     /// An index of an object out of range; more instances or nodes than can be numbered. All stays as it is then.
     pub fn set_instances(&mut self, instances: &[Instance]) -> Result<(), Error> {
