@@ -24,6 +24,13 @@ use antumbra_simd::named_list;
 
 named_list! {
     /// How the binary tree is built.
+    ///
+    /// ```
+    /// use antumbra::recipe::Builder;
+    ///
+    /// assert_eq!("binned-sah".parse(), Ok(Builder::BinnedSah));
+    /// assert_eq!(Builder::default().name(), "reinsertion");
+    /// ```
     #[derive(Default)]
     pub enum Builder("builder"): Properties {
         BinnedSah = "binned-sah",
