@@ -32,6 +32,13 @@ const AREA_PRIOR: f32 = 0.5;
 
 named_list! {
     /// How the binary tree is made wide: which of its nodes become nodes of the wide tree.
+    ///
+    /// ```
+    /// use antumbra::recipe::Collapse;
+    ///
+    /// assert_eq!("area".parse(), Ok(Collapse::Area));
+    /// assert!(Collapse::Learned.needs_log());
+    /// ```
     #[derive(Default)]
     pub enum Collapse("collapse"): Properties {
         Area = "area",
