@@ -8,6 +8,14 @@ use crate::geometry::GeometryId;
 use crate::shape::Shape;
 
 /// Why a tree could not be built or an order not be planned.
+///
+/// ```
+/// use antumbra::{Bvh, Error, Geometry, Recipe};
+///
+/// let mesh = [Geometry::triangles(vec![[0.0; 3]; 3], vec![[0, 1, 7]])];
+/// let error = Bvh::build(&mesh, &Recipe::default()).err().expect("there is no vertex 7");
+/// assert!(matches!(error, Error::IndexOutOfRange { index: 7, vertices: 3, .. }));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
