@@ -6,6 +6,15 @@ use crate::geometry::curve::Curves;
 use crate::math;
 
 /// What four control points mean.
+///
+/// ```
+/// use antumbra::{CurveBasis, Curves};
+///
+/// let points = [[0.0, 0.0, 0.0, 0.01], [0.0, 0.5, 0.0, 0.01], [0.5, 1.0, 0.0, 0.01], [1.0, 1.0, 0.0, 0.01]];
+/// let through = |basis| Curves::cubic(&points, &[0], basis, 0.1).expect("four points").curves.points[0];
+/// assert_eq!(through(CurveBasis::Bezier), points[0]);
+/// assert_ne!(through(CurveBasis::BSpline), points[0]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CurveBasis {
     /// Bezier: the curve goes through the first and the last point.
@@ -17,6 +26,17 @@ pub enum CurveBasis {
 }
 
 /// Segments that stand for cubic curves, and where they lie on them.
+///
+/// ```
+/// use antumbra::{CurveBasis, Curves};
+///
+/// let points = [[0.0, 0.0, 0.0, 0.01], [0.0, 0.5, 0.0, 0.01], [0.5, 1.0, 0.0, 0.01], [1.0, 1.0, 0.0, 0.01]];
+/// let cubic = Curves::cubic(&points, &[0], CurveBasis::Bezier, 0.1).expect("four points");
+/// // A hit at `u` on the first segment is at this parameter of its cubic curve.
+/// let (curve, [from, to]) = cubic.parts[0];
+/// let parameter = |u: f32| from + u * (to - from);
+/// assert_eq!((curve, parameter(0.0)), (0, 0.0));
+/// ```
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct CubicSegments {
