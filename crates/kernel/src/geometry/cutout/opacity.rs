@@ -19,6 +19,30 @@ use crate::hash;
 /// Must be a pure function: the same candidate has the same opacity whenever it is asked for, on any thread.
 /// Candidates are asked about in no particular order, and only those that may matter for the answer. So answers do not
 /// depend on the tree.
+///
+/// ```
+/// use std::sync::Arc;
+///
+/// use antumbra::cutout::{Candidate, Opacity};
+/// use antumbra::{Bvh, Geometry, Ray, Recipe};
+///
+/// /// Clear where `u` is above a half.
+/// #[derive(Debug)]
+/// struct Half;
+///
+/// impl Opacity for Half {
+///     fn opacity(&self, candidate: &Candidate) -> f32 {
+///         if candidate.u > 0.5 { 0.0 } else { 1.0 }
+///     }
+/// }
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let leaf = Geometry::cutouts(&positions[..], vec![[0, 1, 2]], Arc::new(Half));
+/// let bvh = Bvh::build(&[leaf], &Recipe::default())?;
+/// let blocked = |x| bvh.occluded(&Ray::new([x, 0.1, 0.0], [0.0, 0.0, 1.0]));
+/// assert!(blocked(0.2) && !blocked(0.8));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 pub trait Opacity: fmt::Debug + Send + Sync {
     /// The opacity at a point of a triangle, from 0, clear, to 1, opaque. Less is 0, more is 1; NaN is 0.
     fn opacity(&self, candidate: &Candidate) -> f32;
@@ -52,10 +76,31 @@ pub trait Opacity: fmt::Debug + Send + Sync {
 
 /// Pattern of a partly transparent triangle: see [`Opacity::pattern`]. Any 256 bits, such as the texture coordinates of the three
 /// corners and a number for the picture.
+///
+/// ```
+/// use antumbra::cutout::Pattern;
+///
+/// /// The texture coordinates of three corners, and the number of the picture.
+/// fn pattern(uv: [[f32; 2]; 3], picture: u64) -> Pattern {
+///     let corner = |[u, v]: [f32; 2]| u64::from(u.to_bits()) << 32 | u64::from(v.to_bits());
+///     Pattern([corner(uv[0]), corner(uv[1]), corner(uv[2]), picture])
+/// }
+/// let uv = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+/// assert_eq!(pattern(uv, 3), pattern(uv, 3));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Pattern(pub [u64; 4]);
 
 /// A point at which a ray meets a triangle of a mesh that has an [`Opacity`].
+///
+/// ```
+/// use antumbra::PrimId;
+/// use antumbra::cutout::{Candidate, QueryKind};
+///
+/// let triangle = PrimId { inst_id: antumbra::INVALID_ID, geom_id: 0, prim_id: 7 };
+/// let candidate = Candidate::new([0.25, 0.5], triangle, QueryKind::Occluded);
+/// assert_eq!((candidate.u, candidate.v, candidate.prim_id), (0.25, 0.5, 7));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Candidate {
@@ -91,6 +136,19 @@ impl Candidate {
 
 /// The two questions about a ray. A mesh may answer them differently: some scene formats know surfaces that
 /// are seen but throw no shadow.
+///
+/// ```
+/// use antumbra::cutout::{Candidate, QueryKind};
+///
+/// /// Seen by a camera, and without a shadow.
+/// fn opacity(candidate: &Candidate) -> f32 {
+///     match candidate.query {
+///         QueryKind::Occluded => 0.0,
+///         QueryKind::Intersect => 1.0,
+///     }
+/// }
+/// # let _ = opacity;
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum QueryKind {
     /// Is anything in the way? Training logs ask this question, too.
@@ -100,6 +158,24 @@ pub enum QueryKind {
 }
 
 /// Knowledge of the opacity of a triangle or a part of one, for both kinds of query.
+///
+/// ```
+/// use antumbra::cutout::Coverage;
+///
+/// /// Coverage of a part by a mask that is opaque where `u < 0.5`.
+/// fn coverage(corners: &[[f32; 2]; 3]) -> Coverage {
+///     // A margin, because weights are rounded.
+///     let margin = 1.0 / 1024.0;
+///     if corners.iter().all(|[u, _]| *u < 0.5 - margin) {
+///         Coverage::Opaque
+///     } else if corners.iter().all(|[u, _]| *u > 0.5 + margin) {
+///         Coverage::Clear
+///     } else {
+///         Coverage::Mixed
+///     }
+/// }
+/// assert_eq!(coverage(&[[0.0, 0.0], [0.25, 0.0], [0.0, 0.25]]), Coverage::Opaque);
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Coverage {
     /// Opacity 1 everywhere.
