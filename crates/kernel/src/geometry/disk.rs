@@ -16,6 +16,16 @@ use crate::ray::{Hit, Ray};
 /// A flat disk, which is hit from both sides. A ray that runs in the plane of the disk misses it.
 ///
 /// `u` and `v` of a hit are 0. [`Bvh::normal`](crate::Bvh::normal) is the normal given here, on whichever side the hit is.
+///
+/// ```
+/// use antumbra::{Bvh, Disk, Geometry, Ray, Recipe};
+///
+/// let disk = Disk { center: [0.0, 0.0, 1.0], normal: [0.0, 0.0, 1.0], radius: 0.5 };
+/// let bvh = Bvh::build(&[Geometry::disks(vec![disk])], &Recipe::default())?;
+/// assert!(bvh.occluded(&Ray::new([0.4, 0.0, 0.0], [0.0, 0.0, 1.0])));
+/// assert!(!bvh.occluded(&Ray::new([0.4, 0.4, 0.0], [0.0, 0.0, 1.0])));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disk {
     /// Centre.
