@@ -104,6 +104,13 @@ fn one_each<'a, F>(
 }
 
 /// Name of a geometry. Sorted, the geometries of the world itself come first.
+///
+/// ```
+/// use antumbra::GeometryId;
+///
+/// let (ground, wheel) = (GeometryId { object: None, geom_id: 5 }, GeometryId { object: Some(0), geom_id: 0 });
+/// assert!(ground < wheel);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct GeometryId {
     /// Index of the object that has the geometry; `None` in the world itself.
