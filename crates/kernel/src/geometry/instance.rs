@@ -13,6 +13,17 @@ use crate::tree::words::{Sink, Words};
 ///
 /// An instance holds an object, and an object holds geometries. [`NestedInstances`](crate::NestedInstances) makes instances of
 /// objects that hold instances.
+///
+/// ```
+/// use antumbra::{Geometry, Instance, Ray, Recipe, World};
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let leaf = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// let mirrored = Instance::new(0, [[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
+/// let world = World::fixed(&[], &[leaf], &[mirrored], &[], &Recipe::default())?;
+/// assert!(world.occluded(&Ray::new([-0.2, 0.2, 0.0], [0.0, 0.0, 1.0])));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Instance {
