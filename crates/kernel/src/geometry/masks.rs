@@ -11,6 +11,20 @@ use crate::ray::INVALID_ID;
 /// mask see everything, and masks cost them nothing. Queries about points see everything.
 ///
 /// Masks are no part of a tree: they may change at any time and cost no build. See [`Bvh::set_masks`](crate::Bvh::set_masks).
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Recipe};
+/// use antumbra::{Masks, Ray};
+///
+/// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let mut bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// bvh.set_masks(Masks::new().world(vec![0b01]));
+/// let ray = Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
+/// assert!(bvh.query(&ray).mask(0b01).occluded());
+/// assert!(!bvh.query(&ray).mask(0b10).occluded());
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Masks {
