@@ -72,6 +72,14 @@ pub const BLOCK: usize = 8;
 ///
 /// Triangles with a NaN or infinite coordinate or two equal corners are dropped at build. An empty mesh is fine. An index
 /// beyond the positions is an error at build.
+///
+/// ```
+/// use antumbra::{Geometry, TriangleMesh};
+///
+/// let mesh = TriangleMesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
+/// assert_eq!((mesh.positions.len(), mesh.indices.len()), (3, 1));
+/// let geometry = Geometry::Triangles(mesh);
+/// ```
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct TriangleMesh<'a> {
@@ -114,6 +122,16 @@ impl<'a> TriangleMesh<'a> {
 ///
 /// Dropped at build are quads with a NaN or infinite coordinate and quads of which both triangles have two equal corners. An
 /// index beyond the positions is an error at build.
+///
+/// ```
+/// use antumbra::{Bvh, Geometry, Ray, Recipe};
+///
+/// let corners = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 1.0], [0.0, 1.0, 1.0]];
+/// let bvh = Bvh::build(&[Geometry::quads(&corners[..], vec![[0, 1, 2, 3]])], &Recipe::default())?;
+/// let hit = bvh.intersect(&Ray::new([0.75, 0.5, 0.0], [0.0, 0.0, 1.0])).expect("the quad");
+/// assert_eq!((hit.prim_id, hit.u, hit.v), (0, 0.75, 0.5));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct QuadMesh<'a> {
@@ -124,6 +142,16 @@ pub struct QuadMesh<'a> {
 }
 
 /// A full sphere. Rays that start inside hit it from within.
+///
+/// ```
+/// use antumbra::{Bvh, Geometry, Ray, Recipe, Sphere};
+///
+/// let ball = Sphere { center: [0.0, 0.0, 5.0], radius: 1.0 };
+/// let bvh = Bvh::build(&[Geometry::spheres(vec![ball])], &Recipe::default())?;
+/// let t = |z| bvh.intersect(&Ray::new([0.0, 0.0, z], [0.0, 0.0, 1.0])).map(|hit| hit.t);
+/// assert_eq!((t(0.0), t(5.0)), (Some(4.0), Some(1.0)));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
     /// Centre.
@@ -133,6 +161,20 @@ pub struct Sphere {
 }
 
 /// One geometry of a scene; its place in the list given to the builder is the `geom_id`.
+///
+/// ```
+/// use antumbra::{Bvh, Geometry, Ray, Recipe, Sphere};
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let scene = [
+///     Geometry::triangles(&positions[..], vec![[0, 1, 2]]),
+///     Geometry::spheres(vec![Sphere { center: [5.0, 0.0, 0.0], radius: 1.0 }]),
+/// ];
+/// let bvh = Bvh::build(&scene, &Recipe::default())?;
+/// let hit = bvh.intersect(&Ray::new([5.0, 0.0, -5.0], [0.0, 0.0, 1.0])).expect("the sphere");
+/// assert_eq!((hit.geom_id, hit.prim_id), (1, 0));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Geometry<'a> {
