@@ -3,6 +3,18 @@
 use core::fmt;
 
 /// Something that was given and is not among the primitives.
+///
+/// ```
+/// use antumbra::{DropReason, Dropped, Geometry, Primitives};
+///
+/// let flat = [Geometry::triangles(vec![[0.0; 3]; 3], vec![[0, 1, 2]])];
+/// let primitives = Primitives::new(&flat)?;
+/// let [Dropped::Primitive { prim_id, reason, .. }] = primitives.dropped_list() else {
+///     panic!("one triangle is dropped");
+/// };
+/// assert_eq!((*prim_id, *reason), (0, DropReason::CornersCoincide));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Dropped {
@@ -28,6 +40,12 @@ pub enum Dropped {
 }
 
 /// Reason for which something was dropped.
+///
+/// ```
+/// use antumbra::DropReason;
+///
+/// assert_eq!(DropReason::NoNormal.to_string(), "the normal is zero");
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum DropReason {
