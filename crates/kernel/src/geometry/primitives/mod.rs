@@ -52,6 +52,15 @@ pub(crate) use place::MAX_INSTANCES;
 ///
 /// Triangles that their [`Opacity`](crate::cutout::Opacity) calls opaque are kept as triangles of a mesh without one. Triangles
 /// that it calls clear are left out and counted as well.
+///
+/// ```
+/// use antumbra::{Geometry, Primitives};
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let primitives = Primitives::new(&[Geometry::triangles(&positions[..], vec![[0, 1, 2], [0, 1, 1]])])?;
+/// assert_eq!((primitives.len(), primitives.dropped()), (1, 1));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Primitives {
     /// The opaque ones first, then the partly transparent ones.
