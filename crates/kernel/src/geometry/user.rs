@@ -138,6 +138,13 @@ const IDENTITY: [[f64; 4]; 3] = [
 ];
 
 /// A hit on user geometry.
+///
+/// ```
+/// use antumbra::UserHit;
+///
+/// let hit = UserHit::new(2.5, 0.1, 0.9);
+/// assert_eq!(hit.t, 2.5);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct UserHit {
