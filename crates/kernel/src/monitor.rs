@@ -6,6 +6,28 @@ use core::sync::atomic::{AtomicBool, Ordering};
 ///
 /// Asked from the threads of the build, often and in any order. An [`AtomicBool`] is a monitor that stops builds from when it
 /// is true; `()` watches nothing.
+///
+/// ```
+/// use antumbra::{Build, BuildMonitor, Error, Geometry};
+///
+/// /// Prints the progress, and stops at a half.
+/// struct Half;
+///
+/// impl BuildMonitor for Half {
+///     fn progress(&self, done: f32) {
+///         println!("{:.0} %", 100.0 * done);
+///     }
+///
+///     fn cancelled(&self) -> bool {
+///         true
+///     }
+/// }
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// let stopped = Build::new(&geometry).monitor(&Half).bvh();
+/// assert_eq!(stopped.err(), Some(Error::Cancelled));
+/// ```
 pub trait BuildMonitor: Sync {
     /// So much of the build is done: from 0 to 1, never less than before. A rough estimate of the time.
     fn progress(&self, _done: f32) {}
