@@ -30,6 +30,13 @@ use ratio::Estimate;
 
 named_list! {
     /// Child order: in which sequence an occlusion ray visits the children it hits.
+    ///
+    /// ```
+    /// use antumbra::recipe::Order;
+    ///
+    /// assert_eq!("sort+".parse(), Ok(Order::SortPlus));
+    /// assert_eq!(Order::default(), Order::Joint);
+    /// ```
     #[derive(Default)]
     pub enum Order("order"): Properties {
         Simple = "simple",
