@@ -5,6 +5,20 @@ use crate::ray::{Hit, INVALID_ID};
 /// Name of a primitive in the scene: the three ids of a [`Hit`].
 ///
 /// 12 bytes: `inst_id`, `geom_id`, `prim_id`.
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Recipe};
+/// use antumbra::{PrimId, Ray};
+///
+/// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// let ray = Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
+/// let hit = bvh.intersect(&ray).expect("a triangle above");
+/// // Nothing else is there.
+/// assert!(!bvh.query(&ray).except(PrimId::from(hit)).occluded());
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(C)]
 pub struct PrimId {
