@@ -1,6 +1,18 @@
 //! Rays and hits.
 
 /// `inst_id` of a hit that lies in no instance.
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Recipe};
+/// use antumbra::{INVALID_ID, Ray};
+///
+/// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// let hit = bvh.intersect(&Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]));
+/// assert_eq!(hit.map(|hit| hit.inst_id), Some(INVALID_ID));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 pub const INVALID_ID: u32 = u32::MAX;
 
 /// A ray `org + t * dir` restricted to the open interval `tnear < t < tfar`.
@@ -14,6 +26,13 @@ pub const INVALID_ID: u32 = u32::MAX;
 /// from it.
 ///
 /// 32 bytes: origin, `tnear`, direction, `tfar`.
+///
+/// ```
+/// use antumbra::Ray;
+///
+/// let ray = Ray { tfar: 10.0, ..Ray::new([1.0, 2.0, 3.0], [0.0, 0.0, 2.0]) };
+/// assert_eq!((ray.tnear, ray.at(1.5)), (0.0, [1.0, 2.0, 6.0]));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Ray {
@@ -102,6 +121,19 @@ fn next_up(t: f32) -> f32 {
 /// [`Bvh::normal`](crate::Bvh::normal) has the normal there, [`Ray::at`] the point.
 ///
 /// 24 bytes: `t`, `u`, `v`, `prim_id`, `geom_id`, `inst_id`.
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Recipe};
+/// use antumbra::{Hit, Ray};
+///
+/// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// let ray = Ray::new([0.25, 0.5, 0.0], [0.0, 0.0, 1.0]);
+/// let hit: Hit = bvh.intersect(&ray).expect("a triangle above");
+/// assert_eq!((hit.t, hit.u, hit.v, hit.prim_id), (1.0, 0.25, 0.5, 0));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Hit {
