@@ -6,6 +6,13 @@ use crate::error::Error;
 use crate::ray::Ray;
 
 /// Rays of a batch.
+///
+/// ```
+/// use antumbra::{Ray, Rays};
+///
+/// let list = vec![Ray::new([0.0; 3], [0.0, 0.0, 1.0]); 3];
+/// assert_eq!(Rays::from(&list).len(), 3);
+/// ```
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 #[expect(
@@ -83,6 +90,16 @@ impl<'a> Rays<'a> {
 /// | the same for all rays, `[f32; 3]` | `(&memory).into()` |
 /// | x, y and z in an array each | `Column::of_axes(&x, &y, &z)` |
 /// | anything else: x, y, z among other numbers | `Column::new(values, stride)` |
+///
+/// ```
+/// use antumbra::{Column, RayColumns};
+///
+/// // Positions among other numbers: x, y, z, then two of no interest.
+/// let vertices = [0.0, 0.0, 0.0, 9.0, 9.0, 1.0, 0.0, 0.0, 9.0, 9.0];
+/// let up = [0.0, 0.0, 1.0];
+/// let rays = RayColumns::new(2, Column::new(&vertices, 5), &up)?;
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Column<'a> {
     /// From the first number of each axis on.
@@ -182,6 +199,16 @@ impl<'a> From<&'a [f32]> for Column<'a> {
 }
 
 /// Distances of a batch: an end of the intervals of rays, or how far away from points something may be.
+///
+/// ```
+/// use antumbra::RayColumns;
+///
+/// let (origins, up) = ([[0.0; 3], [1.0, 0.0, 0.0]], [0.0, 0.0, 1.0]);
+/// let same = RayColumns::new(2, &origins[..], &up)?.far(10.0)?;
+/// let each = RayColumns::new(2, &origins[..], &up)?.far(&[10.0, 20.0][..])?;
+/// assert!(RayColumns::new(2, &origins[..], &up)?.far(&[10.0][..]).is_err());
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Distance<'a> {
