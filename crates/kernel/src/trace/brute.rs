@@ -17,6 +17,19 @@ use crate::trace::condition::Condition;
 use crate::trace::visit::Ranked;
 
 /// A scene without an acceleration structure, with the queries of [`Bvh`](crate::Bvh): every primitive is tested.
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Recipe};
+/// use antumbra::{Brute, Primitives, Ray};
+///
+/// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// let brute = Brute::new(&Primitives::new(&geometry)?);
+/// let ray = Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
+/// assert_eq!(brute.intersect(&ray), bvh.intersect(&ray));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone)]
 pub struct Brute {
     primitives: Primitives,
