@@ -21,6 +21,19 @@ use crate::tree::wide::WideTree;
 /// A closest hit with its position and normal.
 ///
 /// 48 bytes: the [`Hit`], the position, the normal.
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Recipe};
+/// use antumbra::{Ray, Surface};
+///
+/// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// let ray = Ray::new([0.25, 0.25, 0.0], [0.0, 0.0, 1.0]);
+/// let seen: Surface = bvh.surface(&ray).expect("a triangle above");
+/// assert_eq!((seen.position, seen.normal), ([0.25, 0.25, 1.0], [0.0, 0.0, 1.0]));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 #[non_exhaustive]
