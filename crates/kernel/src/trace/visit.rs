@@ -37,6 +37,23 @@ use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::WideTree;
 
 /// Answer to a hit of a visit: see [`RayQuery::visit_hits`](crate::RayQuery::visit_hits).
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Recipe};
+/// use antumbra::{Ray, Visit};
+///
+/// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// let ray = Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
+/// let mut seen = 0;
+/// let accepted = bvh.query(&ray).visit_hits(|_| {
+///     seen += 1;
+///     Visit::Reject
+/// });
+/// assert_eq!((seen, accepted), (1, None));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Visit {
     /// The hit counts: the visit ends with it.
