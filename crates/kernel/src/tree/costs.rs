@@ -5,6 +5,14 @@ use crate::geometry::primitives::PrimKind;
 /// Costs of the steps of a traversal, in units of the user's choice: the constants of the paper's equation (1).
 ///
 /// Costs are finite and not negative; nothing checks them.
+///
+/// ```
+/// use antumbra::Recipe;
+/// use antumbra::recipe::CostModel;
+///
+/// let recipe = Recipe::default().costs(CostModel::default().prim(1.0));
+/// assert_eq!((recipe.costs.node, recipe.costs.prim), (1.0, 1.0));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CostModel {
