@@ -6,6 +6,13 @@ use antumbra_simd::named_list;
 
 named_list! {
     /// How many children a node has.
+    ///
+    /// ```
+    /// use antumbra::{Recipe, Width};
+    ///
+    /// assert_eq!(Width::from_lanes(8), Some(Width::W8));
+    /// assert_eq!(Recipe::default().width(Width::W4).width.lanes(), 4);
+    /// ```
     pub enum Width("width"): usize {
         W4 = "4", "Four children per node: the paper's QBVH", None, 4;
         W8 = "8", "Eight children per node: the paper's OBVH", None, 8;
