@@ -48,6 +48,7 @@ fn links_lead_to_files_and_headings() {
         "CHANGELOG.md",
         "CONTRIBUTING.md",
         "ARCHITECTURE.md",
+        "bench/performance.md",
     ];
     let mut all: Vec<_> = outside.map(|name| root().join(name)).into();
     pages(&root().join("docs"), &mut all);
