@@ -7,7 +7,11 @@ use antumbra_scene::{Material, Param, Rgb, Texture};
 use super::{color, optional_roughness};
 use crate::named_spectra;
 use crate::params::{ParamType, Values};
+use crate::spectrum;
 use crate::texture::Textured;
+
+/// Wavelength in nanometres at which catalogues have the index of refraction of glasses.
+const YELLOW: f64 = 587.6;
 
 /// Materials of pbrt-v4 that version 3 has not, or under another name.
 pub(crate) const SUPPORTED: &[&str] = &[
@@ -65,7 +69,7 @@ fn diffuse_transmission(values: &mut Textured) -> Material {
     }
 }
 
-/// Index of refraction: a number, or a glass by its name, which then has one index for all colours.
+/// Index of refraction: a number, a glass by its name, or a spectrum, which then has one index for all colours.
 fn index(values: &mut Textured, name: &'static str) -> Param<f32> {
     if let Some((eta, span)) = values.find::<f32>(name) {
         if let Param::Constant(number) = eta
@@ -80,11 +84,15 @@ fn index(values: &mut Textured, name: &'static str) -> Param<f32> {
     let Some(param) = values.lookup.find(name, &[ParamType::Spectrum]) else {
         return 1.5.into();
     };
-    let (text, found) = match &param.values {
-        Values::Strings(names) if names.len() == 1 => {
-            (&names[..1], named_spectra::index(&names[0]))
+    let found = match &param.values {
+        Values::Strings(names) if names.len() == 1 => named_spectra::index(&names[0]),
+        Values::Floats(values) if !values.is_empty() => {
+            let pairs = values.chunks_exact(2);
+            let pairs = pairs.map(|pair| [f64::from(pair[0]), f64::from(pair[1])]);
+            let index = spectrum::interpolated(pairs.collect())(YELLOW);
+            (index > 0.0).then_some(index)
         }
-        _ => (&[][..], None),
+        _ => None,
     };
     match found {
         Some(index) => {
@@ -93,10 +101,7 @@ fn index(values: &mut Textured, name: &'static str) -> Param<f32> {
             (index as f32).into()
         }
         None => {
-            let feature = format!(
-                "the spectrum {} as an index of refraction is",
-                text.join(" ")
-            );
+            let feature = "a spectrum from a file as an index of refraction is";
             values.report.unsupported(param.value, feature);
             1.5.into()
         }

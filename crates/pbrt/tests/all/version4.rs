@@ -116,6 +116,11 @@ fn coated_materials_are_read_with_their_defaults() {
         material4(r#"Material "thindielectric" "spectrum eta" "glass-BK7""#),
         Material::ThinDielectric { eta: 1.5168.into() }
     );
+    let text = r#"Material "thindielectric" "spectrum eta" [500 1.6 600 1.5]"#;
+    let Material::ThinDielectric { eta } = material4(text) else {
+        panic!()
+    };
+    assert!((eta.constant().unwrap() - 1.5124).abs() < 1e-4);
     let text = r#"Texture "r" "float" "bilerp" Material "dielectric" "texture roughness" "r""#;
     let found = format!("{:?}", material4(text));
     assert!(found.contains("Root("), "{found}");
@@ -360,7 +365,7 @@ fn the_version_is_said_in_one_sentence() {
         (
             "\"float eta\" 1.4",
             "\"spectrum eta\" \"metal-Ag-eta\"",
-            "metal-Ag-eta",
+            "from a file as an index",
         ),
         (
             "Material \"diffusetransmission\"",
