@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use antumbra_mesh::{Model, View};
 use antumbra_scene::{
-    Camera, Environment, EnvironmentMapping, Film, Geometry, Image, Integrator, Light, Material, Param, Rgb, Sampler,
-    SamplerKind, Scene, Shape, TriangleMesh,
+    Camera, Environment, EnvironmentMapping, Film, Geometry, Image, Integrator, Light, Material,
+    Param, Rgb, Sampler, SamplerKind, Scene, Shape, TriangleMesh,
 };
 use glam::{Mat3, Mat4, Vec3};
 

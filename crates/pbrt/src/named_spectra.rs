@@ -47,6 +47,8 @@ const COPPER: &[Optical] = &[
     [0.6595, 0.22, 3.747], [0.7045, 0.21, 4.205], [0.7560, 0.24, 4.665],
 ];
 
+// Some absorption coefficients look like other constants.
+#[allow(clippy::approx_constant)]
 #[rustfmt::skip]
 const ALUMINIUM: &[Optical] = &[
     [0.3647, 0.407, 4.426], [0.3875, 0.460, 4.708], [0.4133, 0.523, 5.024], [0.4428, 0.598, 5.385], [0.4769, 0.695, 5.800],

@@ -188,7 +188,9 @@ mod tests {
             (Vec3::X, [1.0, 0.5]),
             (Vec3::Y, [0.5, 1.0]),
             (-Vec3::X, [0.0, 0.5]),
-            (-Vec3::Z, [1.0, 1.0]),
+            // Every corner is the opposite pole. Signs of zeros choose one.
+            (Vec3::new(0.0, 0.0, -1.0), [1.0, 1.0]),
+            (Vec3::new(-0.0, 0.0, -1.0), [0.0, 1.0]),
         ] {
             let found = place(dir);
             assert!(
