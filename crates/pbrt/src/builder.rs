@@ -1,13 +1,20 @@
 //! Builder: turns directives into a scene.
+//!
+//! - `objects`: objects and their instances;  `media`: media by name
+//! - `later`: what pbrt-v4 looks up when a file ends
+
+mod later;
+mod media;
+mod objects;
 
 use std::collections::HashMap;
 use std::sync::Arc;
 
 use antumbra_scene::{
     Accelerator, Camera, Film, Filter, Geometry, Instance, Integrator, Light, LightStrategy,
-    Material, Medium, MediumInterface, Object, Param, Sampler, Scene, Shape,
+    Material, Medium, Object, Param, Sampler, Scene, Shape,
 };
-use glam::{Affine3, DMat4, DVec3, DVec4};
+use glam::{DMat4, DVec3};
 
 use antumbra_image::Allowance;
 
@@ -24,8 +31,7 @@ use crate::state::{BlockKind, State, Transforms};
 use crate::texture::{Images, TextureSpace, Textured};
 use crate::version4;
 use crate::{
-    Options, Times, camera, film, light, material, medium, settings, shape, suggest, texture,
-    transform,
+    Options, Times, camera, film, light, material, settings, shape, suggest, texture, transform,
 };
 
 /// Section of the file.
@@ -197,44 +203,6 @@ impl<'o> Builder<'o> {
         (scene, times)
     }
 
-    /// Resolves what pbrt-v4 resolves at the end of a file.
-    fn finish_version4(&mut self, report: &mut Report) {
-        for (name, (index, at)) in std::mem::take(&mut self.later_materials) {
-            match self.state.named_materials.get(&name) {
-                Some(spec) => self.materials[index] = spec.material.clone(),
-                None => report.error_help(
-                    at,
-                    format!("no material is named {name:?}"),
-                    suggest::help(&name, &self.state.named_materials.names()),
-                ),
-            }
-        }
-        self.film.scale *= self.exposure;
-        // Limits are on values as the sensor has them, scales come after.
-        self.film.max_sample_luminance /= self.film.scale;
-        let mut shapes = self.shapes.iter();
-        let passes = |shape: &Shape| {
-            shape.media.is_some() || matches!(self.materials[shape.material], Material::None)
-        };
-        let mut of_objects = self.objects.iter().flat_map(|object| &object.shapes);
-        let is_clear =
-            self.camera.medium.is_none() && !shapes.any(passes) && !of_objects.any(passes);
-        if let Integrator::VolumePath {
-            max_depth,
-            rr_threshold,
-            light_strategy,
-        } = self.integrator
-            && is_clear
-        {
-            // The same picture, without the search for media.
-            self.integrator = Integrator::Path {
-                max_depth,
-                rr_threshold,
-                light_strategy,
-            };
-        }
-    }
-
     /// Says where the integrator does not know media. They are left out then, as in pbrt-v3.
     fn check_media(&self, end: Span, report: &mut Report) {
         let mut shapes = self.shapes.iter();
@@ -391,70 +359,6 @@ impl<'o> Builder<'o> {
         }
     }
 
-    fn object_begin(&mut self, at: Span, name: Quoted, report: &mut Report) {
-        if let Some(outer) = self.state.now.object {
-            let message = format!("ObjectBegin within that of line {}", outer.line);
-            report.error(at, message);
-        }
-        self.begin_block(BlockKind::Object, at, report);
-        // The name now refers to the new object. Earlier instances keep their object.
-        self.object_indices
-            .insert(name.text.clone(), self.objects.len());
-        self.objects.push(Object {
-            name: name.text,
-            shapes: Vec::new(),
-        });
-    }
-
-    fn object_instance(&mut self, at: Span, name: &Quoted, report: &mut Report) {
-        if let Some(outer) = self.state.now.object {
-            let message = format!(
-                "ObjectInstance within the ObjectBegin of line {}",
-                outer.line
-            );
-            report.error_once(at, message, Some("objects consist of shapes only"));
-            return;
-        }
-        let Some(&object) = self.object_indices.get(&name.text) else {
-            if report.is_counted_only() {
-                return;
-            }
-            let mut known: Vec<&str> = self.object_indices.keys().map(String::as_str).collect();
-            known.sort_unstable();
-            report.error_once(
-                name.span,
-                format!("no object is named {:?}", name.text),
-                Some(&suggest::help(&name.text, &known)),
-            );
-            return;
-        };
-        let transforms = self.state.now.transforms;
-        if transforms.is_animated() {
-            report.unsupported(at, "moving instances are");
-        }
-        // Rounded before the checks, because the scene stores single precision.
-        let to_world = self.to_origin(transforms.start).as_mat4().as_dmat4();
-        if !transform::is_invertible(&to_world) {
-            report.error_once(at, SINGULAR, Some(SINGULAR_HELP));
-            return;
-        }
-        if to_world.row(3) != DVec4::W {
-            report.unsupported(at, "an instance under a perspective transformation is");
-            return;
-        }
-        if transform::uniform_scale(&to_world).is_none() && self.objects[object].has_spheres() {
-            report.unsupported(at, ELLIPSOID);
-            return;
-        }
-        if !self.budget.take(size_of::<Instance>() as u64, at, report) {
-            return;
-        }
-        self.instances.push(Instance {
-            object,
-            world_from_object: Affine3::from_mat4(to_world.as_mat4()),
-        });
-    }
-
     fn coord_sys_transform(&mut self, name: &Quoted, report: &mut Report) {
         match self.coordinate_systems.get(&name.text) {
             Some(system) => {
@@ -601,48 +505,6 @@ impl<'o> Builder<'o> {
         shapes.push(shape);
     }
 
-    fn named_medium(&mut self, at: Span, name: Quoted, params: &Params, report: &mut Report) {
-        let to_world = self.to_origin(self.state.now.transforms.start);
-        let Some(medium) = medium::declare(at, &name, params, &to_world, report) else {
-            // Uses of the name are no further mistakes.
-            self.media_indices.entry(name.text).or_insert(0);
-            return;
-        };
-        let cells = medium.density.as_ref().map_or(0, |grid| grid.values.len());
-        let bytes = size_of::<Medium>() as u64 + size_of::<f32>() as u64 * cells as u64;
-        if self.budget.take(bytes, at, report) {
-            self.media_indices
-                .insert(name.text, self.media.len() as u32);
-            self.media.push(medium);
-        }
-    }
-
-    /// Media on the two sides of a shape, if they differ.
-    fn media(&self, report: &mut Report) -> Option<MediumInterface> {
-        let [inside, outside] = [0, 1].map(|side| self.medium(side, report));
-        (inside != outside).then_some(MediumInterface { inside, outside })
-    }
-
-    /// Medium in force inside (0) or outside (1). An unknown name is vacuum.
-    fn medium(&self, side: usize, report: &mut Report) -> Option<u32> {
-        let name = self.state.now.media[side].as_ref()?;
-        let found = self.media_indices.get(&name.text).copied();
-        if found.is_none() {
-            report.tolerated(
-                name.span,
-                format!("no medium is named {:?}", name.text),
-                "vacuum is taken",
-                || {
-                    let mut known: Vec<&str> =
-                        self.media_indices.keys().map(String::as_str).collect();
-                    known.sort_unstable();
-                    suggest::help(&name.text, &known)
-                },
-            );
-        }
-        found
-    }
-
     /// Index of a material in the scene. New materials are added.
     fn material_index(&mut self, material: Material) -> usize {
         *self
@@ -652,28 +514,6 @@ impl<'o> Builder<'o> {
                 self.materials.push(material);
                 self.materials.len() - 1
             })
-    }
-
-    /// Index of a material that is defined after its use.
-    fn later_material(&mut self, name: &Quoted) -> usize {
-        let known = self.later_materials.entry(name.text.clone());
-        let (index, _) = *known.or_insert_with(|| {
-            self.materials.push(material::DEFAULT);
-            (self.materials.len() - 1, name.span)
-        });
-        index
-    }
-
-    /// Makes a texture of the image that "normalmap" names in a material of pbrt-v4.
-    fn define_normal_map(&mut self, at: Span, params: &mut Params, report: &mut Report) {
-        if !self.is_version4 {
-            return;
-        }
-        let Some(declaration) = version4::normal_map(params, at, self.texture_space()) else {
-            return;
-        };
-        self.pending_textures.push(declaration);
-        self.define_textures(report);
     }
 
     fn texture_space(&self) -> TextureSpace {

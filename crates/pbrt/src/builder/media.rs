@@ -1,0 +1,60 @@
+//! Media by name, and those on the two sides of shapes.
+
+use antumbra_scene::{Medium, MediumInterface};
+
+use super::Builder;
+use crate::directive::Quoted;
+use crate::params::Params;
+use crate::report::Report;
+use crate::source::Span;
+use crate::{medium, suggest};
+
+impl Builder<'_> {
+    pub(super) fn named_medium(
+        &mut self,
+        at: Span,
+        name: Quoted,
+        params: &Params,
+        report: &mut Report,
+    ) {
+        let to_world = self.to_origin(self.state.now.transforms.start);
+        let Some(medium) = medium::declare(at, &name, params, &to_world, report) else {
+            // Uses of the name are no further mistakes.
+            self.media_indices.entry(name.text).or_insert(0);
+            return;
+        };
+        let cells = medium.density.as_ref().map_or(0, |grid| grid.values.len());
+        let bytes = size_of::<Medium>() as u64 + size_of::<f32>() as u64 * cells as u64;
+        if self.budget.take(bytes, at, report) {
+            self.media_indices
+                .insert(name.text, self.media.len() as u32);
+            self.media.push(medium);
+        }
+    }
+
+    /// Media on the two sides of a shape, if they differ.
+    pub(super) fn media(&self, report: &mut Report) -> Option<MediumInterface> {
+        let [inside, outside] = [0, 1].map(|side| self.medium(side, report));
+        (inside != outside).then_some(MediumInterface { inside, outside })
+    }
+
+    /// Medium in force inside (0) or outside (1). An unknown name is vacuum.
+    pub(super) fn medium(&self, side: usize, report: &mut Report) -> Option<u32> {
+        let name = self.state.now.media[side].as_ref()?;
+        let found = self.media_indices.get(&name.text).copied();
+        if found.is_none() {
+            report.tolerated(
+                name.span,
+                format!("no medium is named {:?}", name.text),
+                "vacuum is taken",
+                || {
+                    let mut known: Vec<&str> =
+                        self.media_indices.keys().map(String::as_str).collect();
+                    known.sort_unstable();
+                    suggest::help(&name.text, &known)
+                },
+            );
+        }
+        found
+    }
+}
