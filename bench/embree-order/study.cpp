@@ -61,6 +61,7 @@ using Order = std::vector<std::array<uint8_t, 8>>;
 class Tree {
 public:
     std::vector<Place> places;
+    size_t triangles = 0;
 
     explicit Tree(Ref root) : root(root) { add(root); }
 
@@ -156,7 +157,12 @@ private:
     Ref root;
 
     int add(Ref ref) {
-        if (!ref.isAABBNode()) return -1;
+        if (!ref.isAABBNode()) {
+            size_t num;
+            auto* block = (const Triangle4*)ref.leaf(num);
+            for (size_t i = 0; i < num; i++) triangles += block[i].size();
+            return -1;
+        }
         int index = places.size();
         Node* node = ref.getAABBNode();
         places.push_back({node, {}, {}});
@@ -359,6 +365,11 @@ int main(int count, char** arguments) {
         if (accel->intersectors.ptr && accel->intersectors.ptr->type == AccelData::TY_BVH8) bvh = (BVH8*)accel->intersectors.ptr;
     if (!bvh) { fprintf(stderr, "Embree built no BVH8\n"); return 1; }
     Tree tree(bvh->root);
+    // The layout is that of the headers, not of the library: a tree of another size is another layout.
+    if (tree.triangles > vertices / 3 || 100 * tree.triangles < 99 * (vertices / 3)) {
+        fprintf(stderr, "%s: the tree holds %zu of %zu triangles\n", base.c_str(), tree.triangles, vertices / 3);
+        return 1;
+    }
     printf("scene,triangles,rays,held_out,seed,call,order,ns_per_ray,speed,speed_least,speed_most,node_tests,leaf_blocks,occluded,differences\n");
     bool failed = false;
     for (std::string kind : {"shadow", "ao", "sun"}) {

@@ -370,7 +370,7 @@ fn line(row: &Row, simple: Option<&Row>) -> Vec<String> {
     };
     vec![
         row.order.clone(),
-        number(learned(row, row.prim_cost), 2),
+        number(learned(row, f64::from(row.prim_cost)), 2),
         number(row.node_tests_before, 2),
         number(row.node_tests_after, 2),
         gain(|row| row.node_tests_after),

@@ -183,7 +183,7 @@ fn times_block(plan: &Plan, rows: &[&Row]) -> Result<Option<Block>, Error> {
         if let Some(busy) = row.busy_seconds
             && row.is_on(tree.name(), collapse.name())
             && shown.contains(&&*row.order)
-            && row.prim_cost == f64::from(plan.costs.prim)
+            && row.prim_cost == plan.costs.prim
         {
             let name = format!("{}, {} wide, {}", row.scene, row.width, row.order);
             // Building is no part of a composed time.

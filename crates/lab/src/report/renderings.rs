@@ -57,7 +57,7 @@ pub fn wipe(
                 && row.width == c.width.lanes()
                 && row.is_on(c.tree.name(), c.collapse.name())
                 && row.order == c.order.name()
-                && row.prim_cost == f64::from(c.prim_cost.unwrap_or(plan.costs.prim))
+                && row.prim_cost == c.prim_cost.unwrap_or(plan.costs.prim)
         })
     };
     let all = plan.rendered(width);

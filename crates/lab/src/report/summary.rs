@@ -432,7 +432,7 @@ fn is_of(row: &Row, combination: &Combination) -> bool {
     row.width == width.lanes()
         && row.is_on(tree.name(), collapse.name())
         && row.order == order.name()
-        && prim_cost.is_none_or(|cost| row.prim_cost == f64::from(cost))
+        && prim_cost.is_none_or(|cost| row.prim_cost == cost)
 }
 
 /// The trees of the paper, unsorted, and the default.

@@ -34,7 +34,7 @@ pub struct Row {
     /// Child order.
     pub order: String,
     /// Cost of a primitive test by which the child order was learned: C_p, in node tests.
-    pub prim_cost: f64,
+    pub prim_cost: f32,
     /// Instruction set.
     pub level: String,
     /// Threads of the process.
@@ -261,7 +261,7 @@ impl Row {
             tree: combination.tree.name().to_owned(),
             collapse: combination.collapse.name().to_owned(),
             order: combination.order.name().to_owned(),
-            prim_cost: f64::from(combination.prim_cost.unwrap_or(common.prim_cost)),
+            prim_cost: combination.prim_cost.unwrap_or(common.prim_cost),
             level: common.level.clone(),
             threads: common.threads,
             spp: common.spp,
