@@ -109,8 +109,14 @@ fn a_row_for_every_order_and_width() {
             }
         }
         if !learns {
-            assert_eq!(row["node_tests_unsorted"], row["node_tests_after"], "{order}");
-            assert_eq!(row["prim_tests_unsorted"], row["prim_tests_after"], "{order}");
+            assert_eq!(
+                row["node_tests_unsorted"], row["node_tests_after"],
+                "{order}"
+            );
+            assert_eq!(
+                row["prim_tests_unsorted"], row["prim_tests_after"],
+                "{order}"
+            );
         }
         assert!(row["node_tests_after"].as_f64() >= Some(1.0), "{order}");
         assert!(row["render_seconds"].as_f64() > Some(0.0), "{order}");
@@ -131,7 +137,9 @@ fn a_preset_makes_the_tables_of_the_paper() {
     // Orders that learn are there twice: the paper does not give the cost of a primitive test.
     let (free, learned) = (["simple", "ftob", "sato"], ["sort-", "sort", "sort+"]);
     let own = free.iter().chain(&learned).map(|order| (order, 0.15));
-    let orders: Vec<_> = own.chain(learned.iter().map(|order| (order, 1.0))).collect();
+    let orders: Vec<_> = own
+        .chain(learned.iter().map(|order| (order, 1.0)))
+        .collect();
     assert_eq!(rows.len(), 2 * orders.len());
     for (row, (order, cost)) in rows.iter().zip(orders.iter().cycle()) {
         assert_eq!(row["order"], **order);

@@ -181,7 +181,11 @@ fn longest(items: &[Item]) -> (usize, f32, f32) {
         true => b,
         false => a,
     };
-    [0, 1, 2].map(along).into_iter().reduce(wider).expect("three axes")
+    [0, 1, 2]
+        .map(along)
+        .into_iter()
+        .reduce(wider)
+        .expect("three axes")
 }
 
 #[cfg(test)]
@@ -207,7 +211,10 @@ mod tests {
             BinaryKind::Leaf { count, .. } => Some(count),
             BinaryKind::Inner { .. } => None,
         };
-        tree.nodes.iter().filter_map(|node| count(node.kind)).collect()
+        tree.nodes
+            .iter()
+            .filter_map(|node| count(node.kind))
+            .collect()
     }
 
     /// Three triangles close together cost less as a leaf, far apart less as two nodes. Two are always halved.
@@ -234,7 +241,10 @@ mod tests {
 
     #[test]
     fn coordinates_beyond_the_range_of_areas_are_halved() {
-        let tree = build(&squares(&[-3e38, 3e38, 1e38, 0.0, 2e38, -1e38], 1e38), Rule::LATER);
+        let tree = build(
+            &squares(&[-3e38, 3e38, 1e38, 0.0, 2e38, -1e38], 1e38),
+            Rule::LATER,
+        );
         assert_eq!(leaves(&tree).iter().sum::<u32>(), 6);
     }
 }

@@ -177,12 +177,18 @@ mod tests {
     #[test]
     fn marks_are_where_a_difference_is_beyond_its_spread() {
         let exact = |value| Some(Measured::exact(value));
-        assert_eq!(marks(&[exact(2.0), exact(1.0), None], 2, false), [false, true, false]);
+        assert_eq!(
+            marks(&[exact(2.0), exact(1.0), None], 2, false),
+            [false, true, false]
+        );
         assert_eq!(marks(&[exact(2.0), exact(1.0)], 2, true), [true, false]);
         // What is printed alike is equally good, and nothing is best of equals.
         let three = [exact(1.001), exact(1.002), exact(3.0)];
         assert_eq!(marks(&three, 2, false), [true, true, false]);
-        assert_eq!(marks(&[exact(1.001), exact(1.002)], 2, false), [false, false]);
+        assert_eq!(
+            marks(&[exact(1.001), exact(1.002)], 2, false),
+            [false, false]
+        );
         assert_eq!(marks(&[exact(1.0)], 2, false), [false]);
         // Times: the fastest median is not the best where the rounds overlap.
         let time = |value, low, high| {

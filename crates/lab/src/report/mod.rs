@@ -215,7 +215,10 @@ fn of_the_paper(rows: &[&Row]) -> Option<Table> {
     let simple = lines.iter().find(|line| line.technique == "Simple")?;
     let relation = match theirs.same {
         true => format!("{} in the paper", theirs.name),
-        false => format!("{} in the paper, for which {} stands in", theirs.name, first.scene),
+        false => format!(
+            "{} in the paper, for which {} stands in",
+            theirs.name, first.scene
+        ),
     };
     let cells = |line: &paper::Figures| {
         vec![

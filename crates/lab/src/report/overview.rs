@@ -187,7 +187,11 @@ fn times_block(plan: &Plan, rows: &[&Row]) -> Result<Option<Block>, Error> {
         {
             let name = format!("{}, {} wide, {}", row.scene, row.width, row.order);
             // Building is no part of a composed time.
-            let named = || busy.named().into_iter().filter(|(part, _)| *part != "build");
+            let named = || {
+                busy.named()
+                    .into_iter()
+                    .filter(|(part, _)| *part != "build")
+            };
             parts = named().map(|(part, _)| part.to_owned()).collect();
             lines.push((name, named().map(|(_, seconds)| seconds).collect()));
         }

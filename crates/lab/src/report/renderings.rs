@@ -159,8 +159,12 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
     let mut lines = vec![
         plain_of("N_b before", 2, &|row| row.node_tests_before),
         plain_of("N_t before", 2, &|row| row.prim_tests_before),
-        marked("N_b after", &|row| row.node_tests_after.map(Measured::exact)),
-        marked("N_t after", &|row| row.prim_tests_after.map(Measured::exact)),
+        marked("N_b after", &|row| {
+            row.node_tests_after.map(Measured::exact)
+        }),
+        marked("N_t after", &|row| {
+            row.prim_tests_after.map(Measured::exact)
+        }),
         plain_of("N_b unsorted", 2, &|row| row.node_tests_unsorted),
         plain_of("N_t unsorted", 2, &|row| row.prim_tests_unsorted),
     ];
@@ -170,12 +174,16 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
             marked("top level: N_b after", &|row| {
                 row.top_node_tests_after.map(Measured::exact)
             }),
-            plain_of("top level: N_b unsorted", 2, &|row| row.top_node_tests_unsorted),
+            plain_of("top level: N_b unsorted", 2, &|row| {
+                row.top_node_tests_unsorted
+            }),
         ]);
     }
     lines.extend([
         plain_of("logging, s", 2, &|row| learned(row, row.log_seconds)),
-        plain_of("sorting, ms", 1, &|row| learned(row, 1e3 * row.sort_seconds)),
+        plain_of("sorting, ms", 1, &|row| {
+            learned(row, 1e3 * row.sort_seconds)
+        }),
     ]);
     // A time without a spread marks nothing.
     let timed = |value: Option<f64>, range: Option<[f64; 2]>, rounds: u32| {
@@ -184,7 +192,11 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
         value.map(|value| Measured { value, range })
     };
     lines.push(marked("whole picture, composed, s", &|row| {
-        timed(row.render_seconds, row.render_seconds_range, row.timed_renderings)
+        timed(
+            row.render_seconds,
+            row.render_seconds_range,
+            row.timed_renderings,
+        )
     }));
     if first.timed_renderings > 1 {
         let cells = plain(&own, |row| {

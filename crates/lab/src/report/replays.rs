@@ -96,7 +96,10 @@ pub fn best(plan: &Plan, rows: &[&Row], kind: Kind) -> Block {
 
 /// Least and most in words.
 fn range(range: Option<[f64; 2]>) -> String {
-    range.map_or_else(|| "-".to_owned(), |[least, most]| format!("{least:.2} to {most:.2}"))
+    range.map_or_else(
+        || "-".to_owned(),
+        |[least, most]| format!("{least:.2} to {most:.2}"),
+    )
 }
 
 /// Costs predicted by the paper's model, against measured ones.

@@ -300,7 +300,9 @@ impl Summary {
     /// What a reader should use: by measured rate where rates were measured in several rounds, by cost otherwise, and
     /// which of both.
     pub fn advice(&self) -> Option<String> {
-        let kind = Kind::ALL.into_iter().find(|kind| self.best(*kind).is_some())?;
+        let kind = Kind::ALL
+            .into_iter()
+            .find(|kind| self.best(*kind).is_some())?;
         let advice = self.by_rate(kind).or_else(|| self.by_cost(kind))?;
         let learning = self.over_free_orders();
         Some(match learning {
@@ -312,8 +314,13 @@ impl Summary {
     /// The advice by measured rate. The default is recommended unless something beats it beyond the spread of both.
     fn by_rate(&self, kind: Kind) -> Option<String> {
         let with_rate = |c: Combination| Some((c, self.rate(kind, &c)?));
-        let all: Vec<_> = self.combinations().into_iter().filter_map(with_rate).collect();
-        let (best, rate) = (all.iter().copied()).reduce(|a, b| if b.1.value > a.1.value { b } else { a })?;
+        let all: Vec<_> = self
+            .combinations()
+            .into_iter()
+            .filter_map(with_rate)
+            .collect();
+        let (best, rate) =
+            (all.iter().copied()).reduce(|a, b| if b.1.value > a.1.value { b } else { a })?;
         if all.len() < 2 {
             return None;
         }
@@ -365,7 +372,9 @@ impl Summary {
         let unmeasured = "No rates were measured in several rounds.";
         Some(match own {
             Some(own) if gain < 1.01 * own => {
-                format!("By cost, use the default: nothing counted here costs {words} less. {unmeasured}")
+                format!(
+                    "By cost, use the default: nothing counted here costs {words} less. {unmeasured}"
+                )
             }
             Some(own) if gain < 1.03 * own => format!(
                 "By cost, use the default: the best of all counted here costs {words} {:.0} % less. {unmeasured}",
@@ -385,9 +394,13 @@ impl Summary {
     /// What learning an order gains over the best static order that needs no rays, on trees that learned nothing: in
     /// cost, as geometric mean of the scenes. `None` unless both were measured.
     pub fn over_free_orders(&self) -> Option<String> {
-        let kind = Kind::ALL.into_iter().find(|kind| self.best(*kind).is_some())?;
+        let kind = Kind::ALL
+            .into_iter()
+            .find(|kind| self.best(*kind).is_some())?;
         let base = |c: &Combination| {
-            (c.tree, c.collapse) == self.reference && !c.tree.needs_rays() && !c.collapse.needs_log()
+            (c.tree, c.collapse) == self.reference
+                && !c.tree.needs_rays()
+                && !c.collapse.needs_log()
         };
         let least = |wanted: fn(Order) -> bool| {
             let all = self.combinations().into_iter();
@@ -579,7 +592,10 @@ mod tests {
             Summary::new(&plan, &rows).advice().expect("advice")
         };
         let found = advice(&figures);
-        assert!(found.starts_with("Use the default: by measured rate of shadow rays"), "{found}");
+        assert!(
+            found.starts_with("Use the default: by measured rate of shadow rays"),
+            "{found}"
+        );
         // A faster median within the spread is no reason to leave the default; beyond it is.
         let embree = Combination {
             order: Order::Embree,
@@ -590,13 +606,19 @@ mod tests {
         assert!(found.starts_with("Use the default"), "{found}");
         figures[3].2 = [1.3, 1.2, 1.4];
         let found = advice(&figures);
-        let wanted = format!("Use {}: by measured rate of shadow rays it is 1.25 times", named(&embree));
+        let wanted = format!(
+            "Use {}: by measured rate of shadow rays it is 1.25 times",
+            named(&embree)
+        );
         assert!(found.starts_with(&wanted), "{found}");
         // Without the default, an order that learns nothing is preferred among equals.
         figures.remove(1);
         figures[2].2 = [0.92, 0.9, 0.95];
         let found = advice(&figures);
-        let wanted = format!("Use {}: by measured rate of shadow rays, 2 of 3 are equally", named(&paper));
+        let wanted = format!(
+            "Use {}: by measured rate of shadow rays, 2 of 3 are equally",
+            named(&paper)
+        );
         assert!(found.starts_with(&wanted), "{found}");
         // Rows without rounds: by cost, and it says so.
         let mut rows = replayed(&plan, &figures);
@@ -604,7 +626,10 @@ mod tests {
             (row.speed, row.speed_range) = (None, None);
         }
         let found = Summary::new(&plan, &rows).advice().expect("advice");
-        assert!(found.starts_with("By cost, ") && found.contains("decides for each ray"), "{found}");
+        assert!(
+            found.starts_with("By cost, ") && found.contains("decides for each ray"),
+            "{found}"
+        );
         assert!(found.contains("No rates were measured"), "{found}");
     }
 
