@@ -83,6 +83,7 @@ def main():
     parser.add_argument("--size", type=int, default=100)
     parser.add_argument("--observers", type=int, default=3)
     parser.add_argument("--bilinear", action="store_true", help="reference without the diagonals of squares")
+    parser.add_argument("--together", action="store_true", help="all observers in one run of this program, for the time only")
     parser.add_argument("--time", action="store_true", help="times only, for sizes that the reference is too slow for")
     args = parser.parse_args()
     size, folder = args.size, Path(tempfile.mkdtemp())
@@ -93,6 +94,15 @@ def main():
         file.write(heights, 1)
     rng = np.random.default_rng(1)
     observers = rng.integers(size // 5, size - size // 5, (args.observers, 2))
+    if args.together:
+        places = [transform * (column + 0.5, row + 0.5) for row, column in observers]
+        (folder / "all.csv").write_text("x,y\n" + "".join(f"{x},{y}\n" for x, y in places))
+        command = [args.program, "visible", folder / "dem.tif", folder / "all.csv", "--viewshed", "--curvature"]
+        time = cpu_seconds([*command, "--eye", EYE, "-o", folder / "all.tif"])
+        with rasterio.open(folder / "all.tif") as file:
+            pairs = int(np.nansum(file.read(1).astype(float)))
+        print(f"{args.observers} observers, {size} x {size} cells: {time:.2f} CPU s, {pairs} pairs see each other")
+        return
     wrong, seconds, compared = {}, {}, 0
     for row, column in observers:
         x, y = transform * (column + 0.5, row + 0.5)

@@ -372,6 +372,26 @@ mod tests {
     use crate::HeightField;
 
     #[test]
+    fn spans_beyond_the_reach_of_a_line_are_empty() {
+        let point = Point { m: 0.0, q: 0.0 };
+        let cells = Cells {
+            first: 5,
+            points: vec![point; 3],
+            ..Cells::default()
+        };
+        for (range, from, count) in [
+            (0..2, 5, 0),
+            (5..2, 5, 0),
+            (7..6, 7, 0),
+            (9..12, 8, 0),
+            (6..20, 6, 2),
+        ] {
+            let (at, points) = cells.within(&range);
+            assert_eq!((at, points.len()), (from, count), "{range:?}");
+        }
+    }
+
+    #[test]
     fn blocks_that_are_left_out_change_nothing() {
         for seed in 0..20 {
             let mut rng = Rng::new(seed);

@@ -248,29 +248,29 @@ fn run_on_many(place: &Place, slurm: &[&str]) {
 #[test]
 fn openness_and_viewsheds_on_many_machines_have_the_same_bytes() {
     let place = Place::with_room();
-    let cells: Vec<String> = (0..40)
+    let cells: Vec<String> = (0..160)
         .map(|row| {
-            let heights = (0..50).map(|column| (row * 7 + column * column * 3) % 11);
+            let heights = (0..200).map(|column| (row * 7 + column * column * 3) % 11);
             let heights: Vec<String> = heights.map(|height| height.to_string()).collect();
             heights.join(" ")
         })
         .collect();
-    let head = "ncols 50\nnrows 40\nxllcorner 600000\nyllcorner 5340000\ncellsize 10\n";
+    let head = "ncols 200\nnrows 160\nxllcorner 600000\nyllcorner 5340000\ncellsize 10\n";
     place.write("dem.asc", format!("{head}{}\n", cells.join("\n")));
     // So many observers that there are chunks for each of three tasks.
-    let eyes: String = (0..9000)
+    let eyes: String = (0..400)
         .map(|eye| {
             format!(
                 "{},{}\n",
-                600_010 + 7 * eye % 480,
-                5_340_010 + 13 * eye % 380
+                600_010 + 7 * eye % 1980,
+                5_340_010 + 13 * eye % 1580
             )
         })
         .collect();
     place.write("eyes.csv", format!("x,y\n{eyes}"));
     let program = env!("CARGO_BIN_EXE_antumbra");
     let visible = ["eyes.csv", "--viewshed", "--eye", "3", "--curvature"];
-    let open = ["--samples", "1024", "--two-sided"];
+    let open = ["--samples", "512", "--two-sided"];
     for (scene, job, end, flags) in [
         ("dem.asc", "visible", "tif", &visible[..]),
         ("builtin:city:3000", "ao", "ply", &open),
