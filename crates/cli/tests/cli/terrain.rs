@@ -196,11 +196,12 @@ fn cells_that_are_seen_are_the_same_in_all_files() {
         cells.iter().sum::<f64>()
     );
     assert!(lines.lines().skip(1).all(|line| !line.starts_with('2')));
-    // Rays, which --margin takes, see the same of a wall.
+    // Rays, which --margin takes, see the same from above the surface.
+    place.write("above.csv", "x,y,z\n600055,5339855,7\n600305,5339855,7\n");
     let rays = [
         "visible",
         "dem.tif",
-        "eyes.csv",
+        "above.csv",
         "--viewshed",
         "--margin",
         "0.01",
