@@ -379,15 +379,15 @@ mod tests {
             points: vec![point; 3],
             ..Cells::default()
         };
-        for (range, from, count) in [
-            (0..2, 5, 0),
-            (5..2, 5, 0),
-            (7..6, 7, 0),
-            (9..12, 8, 0),
-            (6..20, 6, 2),
+        for (start, end, from, count) in [
+            (0, 2, 5, 0),
+            (5, 2, 5, 0),
+            (7, 6, 7, 0),
+            (9, 12, 8, 0),
+            (6, 20, 6, 2),
         ] {
-            let (at, points) = cells.within(&range);
-            assert_eq!((at, points.len()), (from, count), "{range:?}");
+            let (at, points) = cells.within(&(start..end));
+            assert_eq!((at, points.len()), (from, count), "{start} to {end}");
         }
     }
 
