@@ -1,138 +1,33 @@
-//! Results about rays that hit something: `Hits`, one for each ray, and `HitList`, all of each ray.
+//! Results about rays that hit something.
+//!
+//! - here: the class `Hits`, one for each ray;  `list`: the class `HitList`, all of each ray
+//! - `columns`: ids and places before they become arrays;  `source`: points and normals of hits
 
-use std::ops::Range;
-use std::sync::Arc;
+mod columns;
+mod list;
+mod source;
 
-use antumbra::{ClosestPoint, Hit, Instance, Ray};
 use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
-use pyo3::exceptions::{PyIndexError, PyTypeError};
+use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PySlice};
 use rayon::prelude::*;
 
+pub use columns::Columns;
+pub use list::HitList;
+use source::Meshes;
+pub use source::Source;
+
 use crate::arrays::shaped;
-use crate::geometry::{Ids, Part, Parts};
+use crate::geometry::Ids;
 use crate::html;
 use crate::memory;
 use crate::saved::Reduced;
-use crate::scene::SceneData;
 use crate::threads::Threads;
-
-/// Ids and places of hits, one column for each.
-#[derive(Default)]
-pub struct Columns {
-    pub t: Vec<f32>,
-    pub triangle: Vec<i32>,
-    pub mesh: Vec<i32>,
-    pub instance: Vec<i32>,
-    pub uv: Vec<f32>,
-}
-
-/// Names of what columns hold, where there is no memory for it.
-const HITS: &str = "hits";
-const WEIGHTS: &str = "weights of hits";
 
 /// Hits whose points or normals a thread computes at a time. Fewer stay on the thread that asks.
 const SOME: usize = 1 << 13;
-
-/// Some rows of columns.
-pub struct Rows<'a> {
-    t: &'a mut [f32],
-    triangle: &'a mut [i32],
-    mesh: &'a mut [i32],
-    instance: &'a mut [i32],
-    uv: &'a mut [[f32; 2]],
-}
-
-impl Columns {
-    /// Rows of rays that hit nothing.
-    pub fn missed(len: usize) -> PyResult<Self> {
-        Ok(Self {
-            t: memory::filled(f32::INFINITY, len, HITS)?,
-            triangle: memory::filled(-1, len, HITS)?,
-            mesh: memory::filled(-1, len, HITS)?,
-            instance: memory::filled(-1, len, HITS)?,
-            uv: memory::filled(0.0, 2 * len, WEIGHTS)?,
-        })
-    }
-
-    /// Makes room for more rows.
-    pub fn grow(&mut self, more: usize) -> PyResult<()> {
-        memory::grow(&mut self.t, more, HITS)?;
-        memory::grow(&mut self.triangle, more, HITS)?;
-        memory::grow(&mut self.mesh, more, HITS)?;
-        memory::grow(&mut self.instance, more, HITS)?;
-        memory::grow(&mut self.uv, 2 * more, WEIGHTS)
-    }
-
-    pub fn rows(&mut self, range: Range<usize>) -> Rows<'_> {
-        Rows {
-            t: &mut self.t[range.clone()],
-            triangle: &mut self.triangle[range.clone()],
-            mesh: &mut self.mesh[range.clone()],
-            instance: &mut self.instance[range.clone()],
-            uv: &mut self.uv.as_chunks_mut().0[range],
-        }
-    }
-
-    pub fn push(&mut self, scene: &SceneData, hit: &Hit) {
-        let ids = Ids::of_hit(scene, hit);
-        self.t.push(hit.t);
-        self.triangle.push(ids.triangle);
-        self.mesh.push(ids.mesh);
-        self.instance.push(ids.instance);
-        self.uv.extend([hit.u, hit.v]);
-    }
-}
-
-impl Rows<'_> {
-    /// Writes hits of as many rays; what is missed stays as it is.
-    pub fn fill(self, scene: &SceneData, hits: &[Option<Hit>]) {
-        for (row, hit) in hits.iter().enumerate() {
-            if let Some(hit) = hit {
-                let ids = Ids::of_hit(scene, hit);
-                self.t[row] = hit.t;
-                self.triangle[row] = ids.triangle;
-                self.mesh[row] = ids.mesh;
-                self.instance[row] = ids.instance;
-                self.uv[row] = [hit.u, hit.v];
-            }
-        }
-    }
-
-    /// Writes nearest points of as many points.
-    pub fn fill_near(self, scene: &SceneData, found: &[Option<ClosestPoint>]) {
-        for (row, near) in found.iter().enumerate() {
-            if let Some(near) = near {
-                let ids = Ids::of_point(scene, near);
-                self.t[row] = near.distance;
-                self.triangle[row] = ids.triangle;
-                self.mesh[row] = ids.mesh;
-                self.instance[row] = ids.instance;
-                self.uv[row] = [near.u, near.v];
-            }
-        }
-    }
-
-    /// As many rows each as told, the last ones perhaps fewer.
-    pub fn chunks(self, len: usize) -> Vec<Self> {
-        let columns = self.t.chunks_mut(len).zip(self.triangle.chunks_mut(len));
-        let columns = columns
-            .zip(self.mesh.chunks_mut(len))
-            .zip(self.instance.chunks_mut(len));
-        let columns = columns.zip(self.uv.chunks_mut(len));
-        columns
-            .map(|((((t, triangle), mesh), instance), uv)| Self {
-                t,
-                triangle,
-                mesh,
-                instance,
-                uv,
-            })
-            .collect()
-    }
-}
 
 /// Arrays of hits, in a shape.
 struct Arrays {
@@ -143,16 +38,6 @@ struct Arrays {
     uv: Py<PyArrayDyn<f32>>,
     point: PyOnceLock<Py<PyArrayDyn<f64>>>,
     normal: PyOnceLock<Py<PyArrayDyn<f32>>>,
-}
-
-/// What knows where a hit lies.
-#[derive(Clone)]
-pub struct Source {
-    parts: Arc<Parts>,
-    /// The tree where the scene has spheres, which alone know their normals.
-    spheres: Option<Arc<SceneData>>,
-    /// Rays of the hits where the scene has spheres, on which ids and weights do not tell the place.
-    rays: Vec<Ray>,
 }
 
 impl Arrays {
@@ -271,146 +156,6 @@ fn gone() -> PyErr {
     pyo3::exceptions::PyRuntimeError::new_err(
         "hits that were pickled have no scene: ask for point and normal before, and they go along",
     )
-}
-
-impl Source {
-    /// `rays` has the ray of each of so many hits, and is used if that is needed.
-    pub fn new(
-        scene: &Arc<SceneData>,
-        rays: impl Iterator<Item = Ray>,
-        hits: usize,
-    ) -> PyResult<Self> {
-        let rays = match scene.has_spheres {
-            true => memory::collected(rays, hits, "rays")?,
-            false => Vec::new(),
-        };
-        Ok(Self {
-            parts: scene.parts.clone(),
-            spheres: scene.has_spheres.then(|| scene.clone()),
-            rays,
-        })
-    }
-
-    /// What knows where some of the hits lie.
-    fn of(&self, places: &[usize]) -> PyResult<Self> {
-        let rays = match self.rays.is_empty() {
-            true => Vec::new(),
-            false => {
-                let rays = places.iter().map(|&place| self.rays[place]);
-                memory::collected(rays, places.len(), "rays")?
-            }
-        };
-        Ok(Self {
-            rays,
-            ..self.clone()
-        })
-    }
-
-    /// Point of a hit of something that has no triangles.
-    #[cold]
-    fn point_on_ray(&self, t: f32, place: usize) -> Option<[f64; 3]> {
-        let ray = self.rays.get(place)?;
-        Some([0, 1, 2].map(|axis| {
-            let here = f64::from(ray.org[axis]) + f64::from(t) * f64::from(ray.dir[axis]);
-            here + self.parts.local.origin[axis]
-        }))
-    }
-
-    /// Normal of a hit of something that has no triangles.
-    #[cold]
-    fn normal_on_ray(&self, ids: Ids, [u, v]: [f32; 2], t: f32, place: usize) -> Option<[f32; 3]> {
-        let ray = self.rays.get(place)?;
-        let [geom_id, inst_id] = self.parts.kernel_ids(ids)?;
-        let hit = Hit {
-            t,
-            u,
-            v,
-            prim_id: ids.triangle as u32,
-            geom_id,
-            inst_id,
-        };
-        self.spheres.as_ref()?.bvh().normal(ray, &hit)
-    }
-}
-
-/// Vertices and faces of a mesh.
-type Triangles<'a> = (&'a [[f32; 3]], &'a [[u32; 3]]);
-
-/// Meshes by their numbers, to find the corners of many hits.
-struct Meshes<'a> {
-    meshes: Vec<Triangles<'a>>,
-    instances: &'a [Instance],
-    origin: [f64; 3],
-}
-
-impl<'a> Meshes<'a> {
-    fn of(parts: &'a Parts) -> Self {
-        let meshes = parts.parts.iter().map(|part| match &**part {
-            Part::Mesh {
-                positions, indices, ..
-            } => (&positions[..], &indices[..]),
-            Part::Spheres(_) => (&[][..], &[][..]),
-        });
-        Self {
-            meshes: meshes.collect(),
-            instances: &parts.instances,
-            origin: parts.local.origin,
-        }
-    }
-
-    /// Corners of a triangle in its mesh.
-    #[inline(always)]
-    fn corners(&self, ids: Ids) -> Option<[[f64; 3]; 3]> {
-        // Ids of what is not there are negative, and therefore beyond all lists.
-        let (positions, indices) = self.meshes.get(ids.mesh as usize)?;
-        let [a, b, c] = *indices.get(ids.triangle as usize)?;
-        let corner = |corner: u32| positions.get(corner as usize);
-        let corners = [corner(a)?, corner(b)?, corner(c)?];
-        Some(corners.map(|corner| corner.map(f64::from)))
-    }
-
-    #[inline(always)]
-    fn point(&self, ids: Ids, uv: [f32; 2]) -> Option<[f64; 3]> {
-        let [a, b, c] = self.corners(ids)?;
-        let [u, v] = uv.map(f64::from);
-        let w = 1.0 - u - v;
-        let [x, y, z] = [0, 1, 2].map(|axis| w * a[axis] + u * b[axis] + v * c[axis]);
-        let placed = match self.instances.get(ids.instance as usize) {
-            None => [x, y, z],
-            Some(instance) => instance.transform.map(|row| {
-                let [a, b, c, d] = row.map(f64::from);
-                a * x + b * y + c * z + d
-            }),
-        };
-        Some([0, 1, 2].map(|axis| placed[axis] + self.origin[axis]))
-    }
-
-    #[inline(always)]
-    fn normal(&self, ids: Ids) -> Option<[f32; 3]> {
-        let [a, b, c] = self.corners(ids)?;
-        let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|axis| corner[axis] - a[axis]));
-        match self.instances.get(ids.instance as usize) {
-            None => unit_normal(p, q),
-            Some(instance) => {
-                let placed = |[x, y, z]: [f64; 3]| {
-                    instance.transform.map(|row| {
-                        let [a, b, c, _] = row.map(f64::from);
-                        a * x + b * y + c * z
-                    })
-                };
-                unit_normal(placed(p), placed(q))
-            }
-        }
-    }
-}
-
-/// Normal of a triangle with these sides, of length 1; `None` if it has no area.
-#[inline(always)]
-fn unit_normal([a, b, c]: [f64; 3], [d, e, f]: [f64; 3]) -> Option<[f32; 3]> {
-    let [x, y, z] = [b * f - c * e, c * d - a * f, a * e - b * d];
-    let squared = x * x + y * y + z * z;
-    let scale = 1.0 / squared.sqrt();
-    (squared > 0.0).then(|| [x, y, z].map(|x| (x * scale) as f32))
 }
 
 /// First hits of rays. Arrays have the shape of the rays.
@@ -752,173 +497,5 @@ impl Hits {
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
         let (hits, rays) = self.counts(py)?;
         Ok(format!("<antumbra.Hits: {hits} of {rays} rays hit>"))
-    }
-}
-
-/// All hits of rays, one list after the other: hits of ray ``i`` are at ``splits[i]:splits[i + 1]``, the nearest first.
-///
-/// The arrays of ``Hits``, with one item for each hit. ``hits[i]`` are the ``Hits`` of ray ``i``, and ``len(hits)`` is the number of rays.
-///
-/// Examples
-/// --------
-/// >>> import antumbra as am
-/// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
-/// >>> hits = scene.intersect_all([[0.2, 0.2, 0], [2, 2, 0]], [0, 0, 1])
-/// >>> [len(of_ray) for of_ray in hits]
-/// [1, 0]
-#[pyclass(frozen, extends = Hits, module = "antumbra")]
-pub struct HitList {
-    splits: Py<PyArrayDyn<i64>>,
-}
-
-impl HitList {
-    pub fn new<'py>(
-        py: Python<'py>,
-        splits: Vec<i64>,
-        columns: Columns,
-        source: Source,
-    ) -> PyResult<Bound<'py, Self>> {
-        let (rays, hits) = (splits.len(), columns.t.len());
-        let list = Self {
-            splits: shaped(py, splits, &[rays])?.unbind(),
-        };
-        Bound::new(py, (list, Hits::new(py, columns, &[hits], source)?))
-    }
-}
-
-#[pymethods]
-impl HitList {
-    /// Where the hits of each ray begin, and the number of hits at the end: int64 of shape (n + 1,), rays in C order.
-    #[getter]
-    fn splits<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<i64>> {
-        self.splits.bind(py).clone()
-    }
-
-    /// Ray of each hit: int64.
-    #[getter]
-    fn ray<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArrayDyn<i64>>> {
-        let py = slf.py();
-        let splits = slf.get().splits.bind(py).try_readonly();
-        let splits =
-            splits.map_err(|error| pyo3::exceptions::PyValueError::new_err(error.to_string()))?;
-        let hits = slf.as_super().get().arrays.t.bind(py).len();
-        let mut rays = memory::room(hits, "rays of hits")?;
-        for (ray, ends) in splits.as_slice()?.windows(2).enumerate() {
-            rays.extend((ends[0]..ends[1]).map(|_| ray as i64));
-        }
-        let hits = rays.len();
-        shaped(py, rays, &[hits])
-    }
-
-    fn __len__(&self, py: Python<'_>) -> usize {
-        self.splits.bind(py).len() - 1
-    }
-
-    fn __getitem__<'py>(slf: &Bound<'py, Self>, ray: &Bound<'py, PyAny>) -> PyResult<Hits> {
-        let py = slf.py();
-        let splits = slf.get().splits.bind(py);
-        let rays = splits.len() - 1;
-        let Ok(index) = ray.extract::<isize>() else {
-            let found = ray.get_type().name()?;
-            return Err(PyTypeError::new_err(format!(
-                "index: found {found}, wanted the number of one ray; arrays such as .t and .ray have all hits"
-            )));
-        };
-        let place = match index < 0 {
-            true => index.saturating_add_unsigned(rays),
-            false => index,
-        };
-        let place = match usize::try_from(place) {
-            Ok(place) if place < rays => place,
-            _ => {
-                return Err(PyIndexError::new_err(format!(
-                    "ray {index} of hits of {rays} rays"
-                )));
-            }
-        };
-        let ends: [i64; 2] = [
-            splits.get_item(place)?.extract()?,
-            splits.get_item(place + 1)?.extract()?,
-        ];
-        let hits = slf.as_super().get();
-        let places = PySlice::new(py, ends[0] as isize, ends[1] as isize, 1);
-        hits.of(py, &hits.chosen(py, &places)?)
-    }
-
-    /// A table of all hits, such as ``pandas.DataFrame`` takes: one row for each hit.
-    ///
-    /// Parameters
-    /// ----------
-    /// point : bool
-    ///     Whether to add ``x``, ``y`` and ``z``.
-    /// normal : bool
-    ///     Whether to add ``nx``, ``ny`` and ``nz``.
-    ///
-    /// Returns
-    /// -------
-    /// dict of str to array (m,)
-    ///     ``ray``, ``t``, ``triangle``, ``mesh``, ``instance``, ``u``, ``v``.
-    ///
-    /// Raises
-    /// ------
-    /// RuntimeError
-    ///     The hits were pickled without the points or normals that are wanted.
-    ///
-    /// Examples
-    /// --------
-    /// >>> import antumbra as am
-    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
-    /// >>> list(scene.intersect_all([[0.2, 0.2, 0]], [0, 0, 1]).to_dict())
-    /// ['ray', 't', 'triangle', 'mesh', 'instance', 'u', 'v']
-    #[pyo3(signature = (*, point=false, normal=false))]
-    fn to_dict<'py>(
-        slf: &Bound<'py, Self>,
-        point: bool,
-        normal: bool,
-    ) -> PyResult<Bound<'py, PyDict>> {
-        let py = slf.py();
-        let columns = PyDict::new(py);
-        columns.set_item("ray", Self::ray(slf)?)?;
-        let hits = slf.as_super().get().columns(py, ("t", point, normal))?;
-        columns.update(hits.as_mapping())?;
-        Ok(columns)
-    }
-
-    fn _repr_html_(slf: &Bound<'_, Self>) -> PyResult<String> {
-        let py = slf.py();
-        let rays = (slf.get().splits.bind(py).len() - 1).to_string();
-        let hits = slf.as_super().get().arrays.t.bind(py).len().to_string();
-        Ok(html::table(
-            "antumbra.HitList",
-            &[("rays", rays), ("hits", hits)],
-        ))
-    }
-
-    #[staticmethod]
-    #[pyo3(name = "_restore_list")]
-    fn restore_list<'py>(
-        py: Python<'py>,
-        splits: Bound<'py, PyArrayDyn<i64>>,
-        state: State<'py>,
-    ) -> PyResult<Bound<'py, Self>> {
-        let list = Self {
-            splits: splits.unbind(),
-        };
-        Bound::new(py, (list, Hits::restore(state)))
-    }
-
-    fn __reduce__<'py>(
-        slf: &Bound<'py, Self>,
-    ) -> Reduced<'py, (Bound<'py, PyArrayDyn<i64>>, State<'py>)> {
-        let (py, list) = (slf.py(), slf.get());
-        let restore = slf.get_type().getattr("_restore_list")?;
-        let state = slf.as_super().get().arrays.state(py);
-        Ok((restore, (list.splits.bind(py).clone(), state)))
-    }
-
-    fn __repr__(slf: &Bound<'_, Self>) -> String {
-        let (py, rays) = (slf.py(), slf.get().splits.bind(slf.py()).len() - 1);
-        let hits = slf.as_super().get().arrays.t.bind(py).len();
-        format!("<antumbra.HitList: {hits} hits of {rays} rays>")
     }
 }
