@@ -94,7 +94,27 @@ struct Balls {
     }
 };
 
+// Curves as one list, and by their segments in another order, which changes the numbers.
+static void curves() {
+    const std::vector<std::array<float, 4>> points{{0, -1, 1, 0.5f}, {0, 0, 1, 0.5f}, {0, 1, 1, 0}};
+    const std::vector<std::uint32_t> segments{1, 0};
+    antumbra::Scene scene;
+    CHECK(scene.add_curves(points) == 0);
+    CHECK(scene.add_curves(points, segments) == 1);
+    scene.set_mask(0, 1);
+    scene.set_mask(1, 2);
+    antumbra::Bvh bvh(scene);
+    const std::vector<antumbra::Ray> rays{antumbra::ray({0.25f, -0.5f, 10}, {0, 0, -1}), antumbra::ray({0.3f, 0.5f, 10}, {0, 0, -1})};
+    for (std::uint32_t geom = 0; geom < 2; ++geom) {
+        auto hits = bvh.batch(rays).mask(1 << geom).intersect();
+        CHECK(hits[0].t == 9 && hits[0].geom_id == geom && hits[0].prim_id == geom && hits[0].u == 0.5f && hits[0].v == 0.25f);
+        CHECK(!antumbra_is_hit(&hits[1]));
+    }
+    CHECK(antumbra::Scene().add_curves(std::vector<std::array<float, 4>>{}) == 0);
+}
+
 int main(int argc, char **argv) {
+    curves();
     CHECK(argc == 2);
     std::mt19937 random(5);
     std::uniform_real_distribution<float> unit(-1, 1);
