@@ -16,6 +16,9 @@ pub struct Hits {
     pub mesh: Vec<i32>,
 }
 
+/// Positions and indices of triangles.
+pub type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
+
 /// What the module holds between calls of the script.
 #[derive(Default)]
 pub struct Module {
@@ -32,7 +35,7 @@ pub struct Module {
     /// Why the last call failed.
     pub error: String,
     /// Meshes that [`Module::add_mesh`] has kept.
-    pub meshes: Vec<(Vec<[f32; 3]>, Vec<[u32; 3]>)>,
+    pub meshes: Vec<Mesh>,
     /// Scenes by number.
     pub scenes: Vec<Option<Bvh>>,
 }
