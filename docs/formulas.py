@@ -59,7 +59,8 @@ class Formula:
         if command in ("text", "mathrm"):
             return self.group().replace("<mi>", '<mi mathvariant="normal">')
         if command in COMMANDS or sign:
-            return f"<mo>{html.escape(COMMANDS.get(command, sign))}</mo>"
+            shown = html.escape((COMMANDS.get(command) or sign).replace("-", "−"))
+            return f'<mo stretchy="false">{shown}</mo>' if sign else f"<mo>{shown}</mo>"
         if number:
             return f"<mn>{number}</mn>"
         if letter:
