@@ -58,7 +58,7 @@ struct Cells {
     line: usize,
     first: usize,
     points: Vec<Point>,
-    /// Whether the blocks from that of the first cell on are projected.
+    /// Whether the blocks from the block of the first cell on are projected.
     is_projected: Vec<bool>,
     has_holes: bool,
 }

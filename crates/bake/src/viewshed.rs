@@ -24,7 +24,7 @@ pub struct Observer {
 /// Job of [`Viewsheds`]: which cells of a height field each observer sees.
 ///
 /// A cell is seen if no part of the surface is strictly above the line from the eye to the centre of the cell, raised by the height
-/// of targets. The surface is that of [`HeightField`]. A line may touch the surface: slopes of lines that differ by less than 1e-12
+/// of targets. [`HeightField`] says what the surface is. A line may touch the surface: slopes of lines that differ by less than 1e-12
 /// count as equal. Cells without data are not seen. An observer sees its own cell, and nothing if its eye is below the surface.
 ///
 /// All is computed in double precision. Bits are the same for any number of threads and shares.

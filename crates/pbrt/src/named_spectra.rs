@@ -4,7 +4,7 @@
 //!
 //! - silver, gold, copper: Johnson and Christy 1972, *Optical Constants of the Noble Metals*, table I
 //! - aluminium: Smith, Shiles and Inokuti in Palik 1985, *Handbook of Optical Constants of Solids*
-//! - magnesium oxide: the dispersion formula of Stephens and Malitson 1952; titanium dioxide: that of Devore 1951, ordinary ray
+//! - magnesium oxide: the dispersion formula of Stephens and Malitson 1952; titanium dioxide: the formula of Devore 1951, ordinary ray
 //!
 //! Glasses have the index of refraction at 587.6 nm of the catalogue of Schott, the same for all colours. Illuminants are
 //! the chromaticities of CIE 15:2004, at luminance 1.

@@ -28,7 +28,7 @@ pub(crate) struct Report {
     pub is_strict: bool,
     /// Whether the scene is of pbrt-v4, whose parameters mean other things in places.
     pub is_version4: bool,
-    /// Primaries of `rgb` parameters, where they are not those of the picture.
+    /// Primaries of `rgb` parameters, where the picture has others.
     pub color_space: Option<DMat3>,
 }
 
@@ -67,7 +67,7 @@ impl Report {
     }
 
     /// Records a mistake that pbrt-v3 goes on after: a warning that says what is `taken` in its place, and an error where the reader
-    /// is strict. `help` says what would be right; it is not asked for where nobody would read it.
+    /// is strict. `help` says what would be right; nobody calls it where nobody would read it.
     pub fn tolerated(
         &mut self,
         span: Span,

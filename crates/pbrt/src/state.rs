@@ -83,7 +83,7 @@ pub(crate) struct Attributes {
     pub reverse_orientation: bool,
     /// Values of parameters that directives of a group do not give, the newest last.
     pub attributes: Vec<(String, Arc<Params>)>,
-    /// Primaries of colours, where they are not those of the picture.
+    /// Primaries of colours, where the picture has others.
     pub color_space: Option<DMat3>,
     /// Place of the `ObjectBegin` of the open object.
     pub object: Option<Span>,

@@ -161,7 +161,7 @@ fn drop(args: &VisibleArgs) -> Result<f64, Failure> {
 /// Observers of a table.
 struct Table {
     observers: Vec<Observer>,
-    /// Points of the world; heights that the table leaves out are those of the surface.
+    /// Points of the world; where the table leaves out heights, points are on the surface.
     points: Vec<[f64; 3]>,
     sensors: Sensors,
 }

@@ -76,7 +76,7 @@ fn line_format(path: &Path) -> Result<Format, Failure> {
 /// there are more of them than observers.
 pub struct Points {
     pub rows: Sensors,
-    /// Points of columns; `None` if they are those of the rows.
+    /// Points of columns; `None` if rows and columns have the same.
     pub columns: Option<Sensors>,
     pub is_viewshed: bool,
 }
@@ -380,7 +380,7 @@ pub fn npz(
 /// Ends of lines of sight.
 pub struct Ends<'a> {
     pub rows: &'a [[f32; 3]],
-    /// `None` if they are those of the rows.
+    /// `None` if rows and columns have the same.
     pub columns: Option<&'a [[f32; 3]]>,
     /// How the points are bent.
     pub curvature: Option<Curvature>,

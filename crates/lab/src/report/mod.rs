@@ -195,7 +195,7 @@ fn of_orders(rows: &[&Row]) -> Option<Table> {
     })
 }
 
-/// The same scene in the paper, or the one that ours stands in for.
+/// The same scene in the paper, or the one that ours replaces.
 fn of_the_paper(rows: &[&Row]) -> Option<Table> {
     const PAPER: [&str; 10] = [
         "order",

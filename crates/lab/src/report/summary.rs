@@ -105,7 +105,7 @@ impl Summary {
         }
     }
 
-    /// A figure of one combination over that of another: geometric mean of all scenes that have such rays. `None`
+    /// A figure of one combination over the same figure of another: geometric mean of all scenes that have such rays. `None`
     /// unless all were measured.
     pub fn ratio(
         &self,
@@ -572,7 +572,7 @@ mod tests {
         figures.iter().map(|figures| (0, row(figures))).collect()
     }
 
-    /// The cheapest combination may be the slowest one: an order that decides for each ray. By cost alone it would be
+    /// The cheapest combination may be the slowest one: an order that decides for each ray. By cost it would be
     /// recommended.
     #[test]
     fn advice_is_by_rate_and_not_by_cost() {
@@ -633,7 +633,7 @@ mod tests {
         assert!(found.contains("No rates were measured"), "{found}");
     }
 
-    /// What learning gains is told against the best of the free orders, not against the arbitrary one.
+    /// What learning gains is compared with the best of the free orders, not against the arbitrary one.
     #[test]
     fn learning_is_compared_with_the_best_order_without_rays() {
         let plan = plan(1);

@@ -19,9 +19,9 @@ use crate::state::State;
 use crate::suggest;
 use crate::texture::{self, TextureSpace};
 
-/// Directives of version 4 alone.
+/// Directives that only version 4 has.
 const DIRECTIVES: &[&str] = &["Attribute", "ColorSpace", "Import", "Option"];
-/// Names of version 4 alone, after their directives.
+/// Names that only version 4 has, after their directives.
 const KINDS: &[(&str, &[&str])] = &[
     ("Film", &["rgb", "gbuffer", "spectral"]),
     (
@@ -54,7 +54,7 @@ const KINDS: &[(&str, &[&str])] = &[
     ),
 ];
 
-/// Names of version 3 alone, after their directives.
+/// Names that only version 3 has, after their directives.
 const OLD_KINDS: &[(&str, &[&str])] = &[
     ("Film", &["image"]),
     ("Integrator", &["directlighting", "whitted"]),
@@ -120,7 +120,7 @@ fn has(table: &[(&str, &[&str])], directive: &[u8], kind: &[u8]) -> bool {
     })
 }
 
-/// The directive that a word is, if its name tells the versions apart.
+/// The directive that a word is, if only one version has it.
 fn named(word: &[u8]) -> &'static [u8] {
     let mut names = KINDS.iter().map(|(of, _)| of.as_bytes());
     names.find(|of| *of == word).unwrap_or_default()

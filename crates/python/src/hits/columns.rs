@@ -102,7 +102,7 @@ impl Rows<'_> {
         }
     }
 
-    /// As many rows each as told, the last ones perhaps fewer.
+    /// As many rows each as given, the last ones perhaps fewer.
     pub fn chunks(self, len: usize) -> Vec<Self> {
         let columns = self.t.chunks_mut(len).zip(self.triangle.chunks_mut(len));
         let columns = columns

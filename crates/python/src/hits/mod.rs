@@ -26,7 +26,7 @@ use crate::memory;
 use crate::saved::Reduced;
 use crate::threads::Threads;
 
-/// Hits whose points or normals a thread computes at a time. Fewer stay on the thread that asks.
+/// Hits whose points or normals a thread computes at a time. Fewer stay on the calling thread.
 const SOME: usize = 1 << 13;
 
 /// Arrays of hits, in a shape.
@@ -263,7 +263,7 @@ impl Hits {
         Ok(columns)
     }
 
-    /// Number of hits, and of what was asked.
+    /// Number of hits, and of rays.
     pub fn counts(&self, py: Python<'_>) -> PyResult<(usize, usize)> {
         let hits = self.hit(py)?.call_method0("sum")?.extract()?;
         Ok((hits, self.arrays.shape(py).iter().product()))
@@ -382,7 +382,7 @@ impl Hits {
         self.arrays.mesh.bind(py).clone()
     }
 
-    /// Place of the instance in the list of instances, -1 for meshes that stand in the world themselves: int32.
+    /// Place of the instance in the list of instances, -1 for meshes in the world itself: int32.
     #[getter]
     fn instance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<i32>> {
         self.arrays.instance.bind(py).clone()

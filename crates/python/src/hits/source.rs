@@ -13,9 +13,9 @@ use crate::scene::SceneData;
 #[derive(Clone)]
 pub struct Source {
     pub(super) parts: Arc<Parts>,
-    /// The tree where the scene has spheres, which alone know their normals.
+    /// The tree where the scene has spheres: only they know their normals.
     spheres: Option<Arc<SceneData>>,
-    /// Rays of the hits where the scene has spheres, on which ids and weights do not tell the place.
+    /// Rays of the hits where the scene has spheres, on which ids and weights do not give the place.
     pub(super) rays: Vec<Ray>,
 }
 

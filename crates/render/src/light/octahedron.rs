@@ -200,7 +200,7 @@ mod tests {
         }
     }
 
-    /// Equal squares have equal solid angles, so moments of the directions are those of the sphere.
+    /// Equal squares have equal solid angles, so directions have the moments of the sphere.
     #[test]
     fn areas_are_equal() {
         let side = 400;

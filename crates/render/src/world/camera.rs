@@ -284,7 +284,7 @@ mod tests {
         }
     }
 
-    /// The directions of pbrt: up at the upper edge, x at the left, z a quarter further. Neighbours are those of the film.
+    /// The directions of pbrt: up at the upper edge, x at the left, z a quarter further. Neighbours on the film are neighbours.
     #[test]
     fn all_around_cameras_see_every_direction() {
         for projection in [Projection::Spherical, Projection::EqualArea] {
