@@ -490,10 +490,10 @@ fn cities_in_map_coordinates_are_those_at_the_origin() {
     for (other_hours, other_sky, other_values) in &all[1..] {
         let near = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-3);
         assert!(near(hours, other_hours) && near(sky, other_sky));
-        assert!(
-            values[1] > 1000.0 && near(values, other_values),
-            "{values:?} {other_values:?}"
-        );
+        let [openness, pairs] = [0, 1].map(|i| [values[i], other_values[i]]);
+        // Directions depend on the bits of coordinates: some rays of some thousand.
+        assert!((openness[0] - openness[1]).abs() < 6e-3, "{openness:?}");
+        assert!(pairs[0] > 1000.0 && pairs[0] == pairs[1], "{pairs:?}");
     }
 }
 

@@ -220,7 +220,7 @@ mod tests {
                 .map(|object| (0..object.min(3)).map(|_| instance(object)).collect())
                 .collect();
             let world = [instance(6), instance(6)];
-            let solid = |object: u32| object % 2 == 0;
+            let solid = |object: u32| object.is_multiple_of(2);
             let nested = NestedInstances::new(&world, &inside, solid).expect("no circle");
             let mut paths: Vec<Vec<u32>> = Vec::new();
             for (flat, inst_id) in nested.instances().iter().zip(0..) {
