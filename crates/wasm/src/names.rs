@@ -1,4 +1,4 @@
-//! Functions that the script calls. Addresses and counts are numbers of 32 bits; functions that can fail return [`FAILED`], and
+//! Functions that the script calls. Addresses and counts are numbers of 32 bits; functions that can fail return `FAILED`, and
 //! [`error`] says why. Names are exported from WebAssembly only: C has an `error` of its own.
 
 use std::cell::RefCell;
