@@ -329,7 +329,7 @@ fn instances_and_holes_are_traced_as_such() {
     assert_eq!(builds.len(), Builder::ALL.len() + engines - 1);
     for build in builds {
         // Two levels, not the written-out triangles. The leaves of pbrt are small, so that blocks are half empty.
-        assert!(build["bytes"].as_u64() < Some(400 * 2216), "{build}");
+        assert!(build["bytes"].as_u64() < Some(500 * 2216), "{build}");
     }
 }
 
