@@ -13,7 +13,7 @@ use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::ray_batch::{LocatedHit, RayBatch, Report};
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
-use crate::trace::surface::{self, Surface, unit};
+use crate::trace::surface::{Surface, surface, unit};
 use crate::tree::any::on_tree;
 use crate::tree::rule::Rule;
 
@@ -132,18 +132,22 @@ impl Bvh {
         batch: &RayBatch<'_>,
         surfaces: &mut [Option<Surface>],
     ) {
+        surfaces.fill(None);
         let mut hits = core::mem::take(&mut memory.hits);
         hits.clear();
         hits.resize(surfaces.len(), None);
-        let mut located = core::mem::take(&mut memory.located);
-        located.clear();
-        located.resize(surfaces.len(), None);
-        let cells = Cell::from_mut(&mut located[..]).as_slice_of_cells();
-        let report = |index: usize, found: &LocatedHit| cells[index].set(Some(*found));
-        let reporting = batch.reporting(Report::Surface(&report));
-        self.intersect_many(memory, &reporting, &mut hits);
-        on_tree!(&self.tree, tree => surface::of_hits(tree, batch.rays, &located, surfaces));
-        (memory.hits, memory.located) = (hits, located);
+        let cells = Cell::from_mut(surfaces).as_slice_of_cells();
+        let report = |index: usize, ray: &Ray, found: &LocatedHit| {
+            cells[index].set(Some(
+                on_tree!(&self.tree, tree => surface(tree, ray, found)),
+            ));
+        };
+        self.intersect_many(
+            memory,
+            &batch.reporting(Report::Surface(&report)),
+            &mut hits,
+        );
+        memory.hits = hits;
     }
 
     pub(super) fn one<Q: Query<Item: Stored + Bits>>(&self, ray: &Ray) -> Q::Answer {

@@ -87,7 +87,8 @@ impl Batch<'_> {
         if !so_far.are_many() {
             let (mut found, mut closest) = (vec![None; len], vec![None; len]);
             let cells = Cell::from_mut(&mut found[..]).as_slice_of_cells();
-            let report = |index: usize, found: &LocatedHit| cells[index].set(Some(found.hit));
+            let report =
+                |index: usize, _: &Ray, found: &LocatedHit| cells[index].set(Some(found.hit));
             let batch = open.batch(first).under(self.conditions());
             let batch = batch.reporting(Report::Surface(&report));
             self.bvh.intersect_many(memory, &batch, &mut closest);

@@ -75,7 +75,7 @@ impl Affine {
         [cross(q, r), cross(r, p), cross(p, q)]
     }
 
-    /// This map after another.
+    /// Product of two maps: `first`, then this one.
     pub fn times(&self, first: &Self) -> Self {
         let columns = [0, 1, 2].map(|column| self.vector(first.rows.map(|row| row[column])));
         let moved = self.point(first.rows.map(|row| row[3]));

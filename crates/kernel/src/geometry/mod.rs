@@ -11,8 +11,8 @@
 //!   which users give boxes and functions;  `cubic`: cubic curves as segments
 //! - `cutout`: leaves of partly transparent triangles; in it `opacity`, the filters of users, and `micromap`, which
 //!   tells where no filter need be asked
-//! - `instance`: objects placed in the world;  `nested`: objects in objects;  `instance_ray`: a ray in one;  `ray_setup`: a ray made ready;
-//!   `slab_test`: boxes
+//! - `instance`: objects placed in the world;  `nested`: objects in objects;  `instance_ray`: a ray in an object;
+//!   `ray_setup`: a ray made ready;  `slab_test`: boxes
 //! - `best`: the best hit so far
 //! - `sound`: which primitives can be kept;  `moved`: geometry whose vertices moved
 //! - `masks`: which geometries and instances rays see

@@ -1,7 +1,7 @@
 //! Nested instances: objects that hold instances of other objects, made flat.
 //!
-//! A ray goes through two levels, however deep the nesting is: each way from the world to an object with geometry becomes one
-//! instance, whose transform is the product along the way.
+//! A ray goes through two levels, however deep the nesting is: each path from the world to an object with geometry becomes one
+//! instance, whose transform is the product along the path.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -36,12 +36,12 @@ use crate::ray::INVALID_ID;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct NestedInstances {
     instances: Vec<Instance>,
-    /// Step at which the way of each instance ends.
+    /// Step at which the path of each instance ends.
     ends: Vec<u32>,
     steps: Vec<Step>,
 }
 
-/// Step of a way from the world inwards.
+/// Step of a path from the world inwards.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Step {
     /// Step before, or [`INVALID_ID`] in the world.
@@ -54,11 +54,13 @@ impl NestedInstances {
     /// `world` are the instances in the world, and `inside[i]` those in object `i`. `has_geometry` says whether an object has
     /// geometry of its own; an object without geometry and without instances is left out.
     ///
-    /// Ways are in the order of the lists: the geometry of an object before the instances inside.
+    /// Paths are in the order of the lists: the geometry of an object before the instances inside.
     ///
     /// # Errors
-    /// [`Error::ObjectOutOfRange`] for an object that is not in `inside`; [`Error::NestsItself`]; [`Error::TooMany`] ways,
-    /// 2²⁹ - 2 of which are allowed.
+    /// - [`Error::ObjectOutOfRange`] for an object that is not in `inside`; `inst_id` is the place in the list of the world, or
+    ///   of the object that holds the instance.
+    /// - [`Error::NestsItself`] for a circle.
+    /// - [`Error::TooMany`] for more than 2²⁹ - 2 paths, ends without geometry included.
     pub fn new(
         world: &[Instance],
         inside: &[impl AsRef<[Instance]>],
@@ -100,12 +102,12 @@ impl NestedInstances {
         Ok(nested)
     }
 
-    /// One instance for each way from the world to an object with geometry.
+    /// One instance for each path from the world to an object with geometry.
     pub fn instances(&self) -> &[Instance] {
         &self.instances
     }
 
-    /// Way to an instance, from the world inwards: places in the list of the world, then in the lists of the objects.
+    /// Path to an instance, from the world inwards: places in the list of the world, then in the lists of the objects.
     ///
     /// # Panics
     /// If there is no such instance.
@@ -135,7 +137,7 @@ impl<L: AsRef<[Instance]>> Lists<'_, L> {
         }
     }
 
-    /// Steps of all ways, and whether they end: checked before there are any, for each level can multiply them.
+    /// Steps of all paths, and whether they end: checked before there are any, for each level can multiply them.
     fn count(&self, has_geometry: &impl Fn(u32) -> bool) -> Result<usize, Error> {
         /// Counting has begun, but not ended.
         const OPEN: u64 = u64::MAX;
@@ -244,7 +246,7 @@ mod tests {
             assert!(paths.is_sorted(), "in the order of the lists");
             let count = paths.len();
             paths.dedup();
-            assert_eq!(paths.len(), count, "each way once");
+            assert_eq!(paths.len(), count, "each path once");
         }
     }
 

@@ -7,7 +7,6 @@ use std::sync::{Mutex, PoisonError};
 use crate::geometry::ray_setup::RaySetup;
 use crate::ray::{Hit, Ray};
 use crate::trace::instrumented::Open;
-use crate::trace::ray_batch::LocatedHit;
 use crate::trace::ray_sort::Keys;
 use crate::trace::stack::Item;
 use crate::trace::visit::Ahead;
@@ -30,8 +29,6 @@ pub(crate) struct Memory {
     pub pending: Vec<u32>,
     /// Closest hits of which more is told.
     pub hits: Vec<Option<Hit>>,
-    /// The same hits, with the leaves of their primitives.
-    pub located: Vec<Option<LocatedHit>>,
     /// Rays made ready for a stream.
     pub setups: Vec<RaySetup>,
     /// Rays of a batch that were brought together.

@@ -154,13 +154,26 @@ pub(crate) trait StreamQuery: Query {
 /// triangles: 2 % of the instructions of occlusion in batches (AVX2).
 #[cold]
 #[inline(never)]
-pub(super) fn other_lanes<const N: usize>(
+fn other_lanes<const N: usize>(bvh: &WideTree<N>, leaf: Leaf, ray: &RaySetup, limit: f32) -> u32 {
+    on_leaf!(bvh, leaf, block => block.candidates::<Scalar, false>(Scalar, ray, limit).0)
+}
+
+/// The lanes of a leaf in a ray stream that may be hit no farther than `limit`, as bits.
+#[inline(always)]
+pub(super) fn lanes_in_stream<S: Simd, const N: usize>(
+    simd: S,
     bvh: &WideTree<N>,
     leaf: Leaf,
     ray: &RaySetup,
     limit: f32,
 ) -> u32 {
-    on_leaf!(bvh, leaf, block => block.candidates::<Scalar, false>(Scalar, ray, limit).0)
+    match leaf.kind {
+        PrimKind::Triangle => {
+            let block = &bvh.blocks.triangles[leaf.index];
+            block.candidates::<S, true>(simd, ray, limit).0
+        }
+        _ => other_lanes(bvh, leaf, ray, limit),
+    }
 }
 
 /// [`other_lanes`] for occlusion; if nobody decides about hits, those that occlude the ray.
@@ -373,11 +386,7 @@ impl StreamQuery for Closest {
         ray: &RaySetup,
         _: bool,
     ) -> u32 {
-        if leaf.kind == PrimKind::Triangle {
-            let block = &bvh.blocks.triangles[leaf.index];
-            return block.candidates::<S, true>(simd, ray, best.limit).0;
-        }
-        other_lanes(bvh, leaf, ray, best.limit)
+        lanes_in_stream(simd, bvh, leaf, ray, best.limit)
     }
 
     #[inline(always)]

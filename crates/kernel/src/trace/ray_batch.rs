@@ -39,11 +39,11 @@ pub(crate) enum Report<'a> {
     /// The occluder of an occluded ray.
     Occluder(&'a dyn Fn(usize, PrimId)),
     /// The closest hit of a ray.
-    Surface(&'a dyn Fn(usize, &LocatedHit)),
+    Surface(&'a dyn Fn(usize, &Ray, &LocatedHit)),
 }
 
 /// A hit, and where the tree has the primitive.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct LocatedHit {
     /// With ids as in the tree.
     pub hit: Hit,
@@ -196,7 +196,7 @@ impl<'a> RayBatch<'a> {
     /// Reports the closest hit of a ray.
     pub fn report_surface(&self, index: usize, found: &LocatedHit) {
         if let Report::Surface(receive) = self.report {
-            receive(self.start + index, found);
+            receive(self.start + index, &self.rays[index], found);
         }
     }
 }

@@ -7,14 +7,13 @@ use crate::geometry::cutout::opacity::QueryKind;
 use crate::geometry::cutout::{CutoutBlock, CutoutHit, Filters};
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::leaf_block::LeafBlock;
-use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::{LanesOf, VectorHits};
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
 use crate::trace::conditional::named;
-use crate::trace::query::{Closest, Query, StreamQuery, other_lanes};
+use crate::trace::query::{Closest, Query, StreamQuery, lanes_in_stream};
 use crate::trace::stack::Stack;
 use crate::tree::leaves::on_leaf;
 use crate::tree::node::Leaf;
@@ -162,11 +161,7 @@ impl StreamQuery for Nearest {
         ray: &RaySetup,
         _: bool,
     ) -> u32 {
-        if leaf.kind == PrimKind::Triangle {
-            let block = &bvh.blocks.triangles[leaf.index];
-            return block.candidates::<S, true>(simd, ray, found.last.limit).0;
-        }
-        other_lanes(bvh, leaf, ray, found.last.limit)
+        lanes_in_stream(simd, bvh, leaf, ray, found.last.limit)
     }
 
     #[inline(always)]

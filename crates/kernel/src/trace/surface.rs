@@ -4,7 +4,7 @@
 //! triangle it is then moved to the nearest point of the plane. (The mean of the corners by the barycentrics lies in the plane,
 //! too, but far from the ray on slivers, whose barycentrics are of single precision.)
 
-use antumbra_simd::{Scalar, Simd};
+use antumbra_simd::Scalar;
 
 use crate::geometry::PrimRef;
 use crate::geometry::instance::{Affine, cross, dot};
@@ -48,30 +48,8 @@ pub struct Surface {
     pub normal: [f32; 3],
 }
 
-/// Surfaces of the hits of many rays. A stream comes to its hits in any order, and leaves may have left the cache, so they are
-/// prefetched.
-pub(crate) fn of_hits<const N: usize>(
-    bvh: &WideTree<N>,
-    rays: &[Ray],
-    located: &[Option<LocatedHit>],
-    surfaces: &mut [Option<Surface>],
-) {
-    /// Rays between the prefetch of a leaf and its use.
-    const AHEAD: usize = 8;
-    for (index, surface_of) in surfaces.iter_mut().enumerate() {
-        if let Some(Some(coming)) = located.get(index + AHEAD)
-            && let ChildKind::Leaf(leaf) = coming.leaf.kind()
-            && leaf.kind == PrimKind::Triangle
-        {
-            Scalar.prefetch(&bvh.blocks.triangles[leaf.index]);
-        }
-        let found = located[index].as_ref();
-        *surface_of = found.map(|found| surface(bvh, &rays[index], found));
-    }
-}
-
 /// The surface of a hit that was found.
-fn surface<const N: usize>(bvh: &WideTree<N>, ray: &Ray, found: &LocatedHit) -> Surface {
+pub(crate) fn surface<const N: usize>(bvh: &WideTree<N>, ray: &Ray, found: &LocatedHit) -> Surface {
     let hit = found.hit.told();
     let (mut position, mut normal) = ([0, 1, 2].map(|axis| at(ray, hit.t, axis)), [0.0; 3]);
     let placed = bvh.instances.get(found.instance as usize);

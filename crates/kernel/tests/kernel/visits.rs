@@ -457,10 +457,15 @@ fn rays_of_a_batch_visit_many_hits() {
     let geometry: Vec<_> = panes.iter().map(geometry).collect();
     let bvh = Bvh::build(&geometry, &Recipe::default()).expect("in range");
     let mut rng = Rng::new(9);
+    // Half of the rays begin among the panes and look back as far.
     let rays: Vec<Ray> = (0..10_000)
-        .map(|_| {
+        .map(|index| {
             let [x, y, _] = rng.point(1.2);
-            Ray::new([x, y, 0.0], [0.0, 0.0, 1.0])
+            let middle = 15.5 * (index % 2) as f32;
+            Ray {
+                tnear: -middle,
+                ..Ray::new([x, y, middle], [0.0, 0.0, 1.0])
+            }
         })
         .collect();
     let decide = |seen: &mut Vec<u32>, hit: Hit, last: usize| {
