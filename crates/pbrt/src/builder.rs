@@ -1,7 +1,7 @@
 //! Builder: turns directives into a scene.
 //!
 //! - `objects`: objects and their instances;  `media`: media by name
-//! - `later`: what pbrt-v4 looks up when a file ends
+//! - `later`: names that pbrt-v4 looks up when a file ends
 
 mod later;
 mod media;
@@ -357,6 +357,7 @@ impl<'o> Builder<'o> {
         while self.state.blocks().len() > depth {
             self.state.pop();
         }
+        report.color_space = self.state.now.color_space;
     }
 
     fn coord_sys_transform(&mut self, name: &Quoted, report: &mut Report) {
@@ -480,9 +481,6 @@ impl<'o> Builder<'o> {
             Some(name) => self.later_material(&name),
             None => self.material_index(material),
         };
-        if area_light.is_some() && matches!(cutouts.alpha, Some(Param::Constant(_))) {
-            report.unsupported(at, "an invisible light (\"alpha\" 0) is");
-        }
         let shape = Shape {
             geometry,
             material,
@@ -493,6 +491,9 @@ impl<'o> Builder<'o> {
             reverse_orientation: self.state.now.reverse_orientation,
             transform_swaps_handedness: transform::swaps_handedness(&to_world),
         };
+        if shape.area_light.is_some() && matches!(shape.alpha, Some(Param::Constant(_))) {
+            report.unsupported(at, "an invisible light (\"alpha\" 0) is");
+        }
         // Objects are never nested, so the last one is the open one.
         let object = is_of_object.then(|| self.objects.len() - 1);
         let shapes = match object {
@@ -547,15 +548,14 @@ impl<'o> Builder<'o> {
 }
 
 impl Handler for Builder<'_> {
-    fn directive(&mut self, at: Span, directive: Directive, report: &mut Report) {
+    fn directive(&mut self, at: Span, mut directive: Directive, report: &mut Report) {
         use Directive as D;
-        let mut directive = directive;
         if self.is_version4 {
             version4::fill(&mut directive, &self.state);
-            if let Directive::Camera(_, params) = &mut directive {
+            if let D::Camera(_, params) = &directive {
                 self.exposure = version4::exposure(params, at, report);
             }
-            directive = version4::translate(directive, report);
+            version4::translate(&mut directive, report);
         }
         if !self.check_phase(at, &directive, report) {
             return;
@@ -607,10 +607,7 @@ impl Handler for Builder<'_> {
             D::WorldBegin => self.world_begin(),
             D::WorldEnd => self.world_end(report),
             D::AttributeBegin => self.begin_block(BlockKind::Attribute, at, report),
-            D::AttributeEnd => {
-                self.end_block(BlockKind::Attribute, at, report);
-                report.color_space = self.state.now.color_space;
-            }
+            D::AttributeEnd => self.end_block(BlockKind::Attribute, at, report),
             D::TransformBegin => self.begin_block(BlockKind::Transform, at, report),
             D::TransformEnd => self.end_block(BlockKind::Transform, at, report),
             D::ObjectBegin(name) => self.object_begin(at, name, report),

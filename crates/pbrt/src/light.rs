@@ -209,7 +209,7 @@ fn infinite4(
     report: &mut Report,
 ) -> Option<Light> {
     let radiance = scaled(lookup, "L", report);
-    let why = "it tells where the sky is seen from, and changes noise only";
+    let why = "portals change noise only";
     lookup.left_out("portal", &[ParamType::Point3], why, report);
     let light = |radiance, environment| {
         Some(Light::Infinite {
@@ -235,7 +235,7 @@ fn infinite4(
         report.error_help(
             lookup.at,
             format!("the image of an infinite light has {width} x {height} pixels"),
-            "in pbrt-v4 it is a square, an octahedron of equal areas",
+            "pbrt-v4 takes a square image of an octahedron; imgtool makeequiarea of pbrt-v4 makes one",
         );
         return None;
     }

@@ -142,7 +142,7 @@ pub(crate) fn find(name: &str) -> Option<Named> {
     Some(Named::Samples(samples.collect()))
 }
 
-/// Index of refraction of a glass, or of another transparent substance at 587.6 nm. `None`: it is none.
+/// Index of refraction of a glass, or of another transparent substance at 587.6 nm. `None`: the name is of nothing transparent.
 pub(crate) fn index(name: &str) -> Option<f64> {
     match (name, find(name)?) {
         (_, Named::Index(index)) => Some(index),

@@ -10,7 +10,7 @@ use crate::number::parse_float;
 use crate::params::{self, Outcome, Params, shorten};
 use crate::report::Report;
 use crate::source::Span;
-use crate::suggest;
+use crate::{suggest, version4};
 
 /// Largest depth of includes.
 const MAX_INCLUDE_DEPTH: usize = 64;
@@ -83,6 +83,15 @@ impl Parser {
                 skip_past_arguments(lexer, report);
                 continue;
             };
+            if !report.is_version4 && version4::DIRECTIVES.contains(&name) {
+                report.error_help(
+                    token.span,
+                    format!("{name} is a directive of pbrt-v4, but the scene is read as pbrt-v3"),
+                    "the main file decides by its first name that only one version has",
+                );
+                skip_past_arguments(lexer, report);
+                continue;
+            }
             if name == "Include" || name == "Import" {
                 // In pbrt-v4, the state after an `Import` is the state before.
                 let import = (name == "Import").then_some(token.span);

@@ -17,8 +17,8 @@ use crate::source::read_regular_file;
 const FIRST_NM: u32 = 360;
 const LAST_NM: u32 = 830;
 
-/// What a spectrum is of.
-#[derive(Clone, Copy, PartialEq, Eq)]
+/// Kind of object that a spectrum belongs to.
+#[derive(Clone, Copy)]
 enum Of {
     /// A surface or an interface, in pbrt-v4 seen under daylight: an even spectrum is grey.
     Surface,
@@ -38,24 +38,14 @@ pub(crate) fn read_emission(param: &Param, report: &mut Report) -> Option<Rgb> {
 
 fn read_as(param: &Param, of: Of, report: &mut Report) -> Option<Rgb> {
     let name = &param.name;
+    let is_version4 = report.is_version4;
     let color_of = |samples: Vec<[f64; 2]>| match of {
-        _ if !report.is_version4 => from_samples(samples),
+        _ if !is_version4 => from_samples(samples),
         Of::Surface => of_surface(samples),
         Of::Light => at_luminance_1(from_samples(samples)),
     };
     let color = match (&param.values, param.param_type) {
         (Values::Broken, _) => return None,
-        (Values::Strings(names), ParamType::Spectrum)
-            if report.is_version4
-                && let [name] = names.as_slice()
-                && let Some(named) = named_spectra::find(name) =>
-        {
-            match named {
-                Named::Samples(samples) => color_of(samples),
-                Named::Index(index) => DVec3::splat(index),
-                Named::Light(light) => light,
-            }
-        }
         (Values::Strings(files), _) => {
             let [file] = files.as_slice() else {
                 report.error(
@@ -64,18 +54,26 @@ fn read_as(param: &Param, of: Of, report: &mut Report) -> Option<Rgb> {
                 );
                 return None;
             };
-            match read_spd(file, report) {
-                Ok(samples) if !report.is_version4 => from_samples(samples),
-                Ok(samples) if of == Of::Surface => of_surface(samples),
-                Ok(samples) => at_luminance_1(from_samples(samples)),
-                Err(message) => {
-                    report.error_help(
-                        param.value,
-                        format!("cannot read spectrum {file:?}: {message}"),
-                        format!("without the file, write it as \"rgb {name}\""),
-                    );
-                    return None;
-                }
+            let named = match is_version4 {
+                true => named_spectra::find(file),
+                false => None,
+            };
+            match named {
+                Some(Named::Samples(samples)) => color_of(samples),
+                // Glasses have one index for all wavelengths.
+                Some(Named::Index(index)) => color_of(vec![[f64::from(FIRST_NM), index]]),
+                Some(Named::Light(light)) => light,
+                None => match read_spd(file, report) {
+                    Ok(samples) => color_of(samples),
+                    Err(message) => {
+                        report.error_help(
+                            param.value,
+                            format!("cannot read spectrum {file:?}: {message}"),
+                            format!("without the file, write it as \"rgb {name}\""),
+                        );
+                        return None;
+                    }
+                },
             }
         }
         (Values::Floats(values), _) if values.iter().any(|v| !v.is_finite()) => {
@@ -87,10 +85,12 @@ fn read_as(param: &Param, of: Of, report: &mut Report) -> Option<Rgb> {
             color_of(pairs.map(|p| [f64::from(p[0]), f64::from(p[1])]).collect())
         }
         (Values::Floats(values), ParamType::Blackbody) => match values[..] {
-            [kelvin] if kelvin > 0.0 && report.is_version4 => {
+            [kelvin] if kelvin > 0.0 && is_version4 => {
                 at_luminance_1(from_black_body(kelvin.into()))
             }
-            [kelvin, scale] if kelvin > 0.0 => from_black_body(kelvin.into()) * f64::from(scale),
+            [kelvin, scale] if kelvin > 0.0 && !is_version4 => {
+                from_black_body(kelvin.into()) * f64::from(scale)
+            }
             [kelvin] | [kelvin, _] if !(kelvin > 0.0) => {
                 report.error(
                     param.value,
@@ -98,6 +98,7 @@ fn read_as(param: &Param, of: Of, report: &mut Report) -> Option<Rgb> {
                 );
                 return None;
             }
+            _ if is_version4 => return wrong_count(param, "one temperature", report),
             _ => return wrong_count(param, "a temperature and a scale", report),
         },
         (Values::Floats(values), kind @ (ParamType::Rgb | ParamType::Xyz)) => match values[..] {

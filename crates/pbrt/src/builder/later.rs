@@ -1,4 +1,4 @@
-//! What pbrt-v4 looks up when a file ends, and images that its materials name.
+//! Names that pbrt-v4 looks up when a file ends, and images that its materials name.
 
 use antumbra_scene::{Integrator, Material, Shape};
 
@@ -10,7 +10,7 @@ use crate::source::Span;
 use crate::{material, suggest, version4};
 
 impl Builder<'_> {
-    /// Resolves what pbrt-v4 resolves at the end of a file.
+    /// Looks up materials that are defined after their use, and sets what depends on the whole file.
     pub(super) fn finish_version4(&mut self, report: &mut Report) {
         for (name, (index, at)) in std::mem::take(&mut self.later_materials) {
             match self.state.named_materials.get(&name) {
@@ -39,7 +39,7 @@ impl Builder<'_> {
         } = self.integrator
             && is_clear
         {
-            // The same picture, without the search for media.
+            // There are no media, so paths need not look for them.
             self.integrator = Integrator::Path {
                 max_depth,
                 rr_threshold,

@@ -28,7 +28,7 @@ pub(crate) const SUPPORTED: &[&str] = &[
 #[cfg(test)]
 pub(crate) const UNSUPPORTED: &[&str] = &["measured"];
 
-/// Reads a material by its name. `None`: it has none of these names.
+/// Reads a material by its name. `None`: the name is not in [`SUPPORTED`].
 pub(super) fn build(name: &str, values: &mut Textured) -> Option<Material> {
     Some(match name {
         "diffuse" => Material::Matte {
@@ -92,6 +92,7 @@ fn index(values: &mut Textured, name: &'static str) -> Param<f32> {
             let index = spectrum::interpolated(pairs.collect())(YELLOW);
             (index > 0.0).then_some(index)
         }
+        Values::Broken => return 1.5.into(),
         _ => None,
     };
     match found {
@@ -143,7 +144,8 @@ fn conductor(values: &mut Textured, roughness: [Param<f32>; 2]) -> Material {
         Some((Param::Texture(texture), span)) => {
             values.report.note(
                 span,
-                "a texture of a conductor's reflectance is rendered with Schlick's Fresnel term",
+                "a texture of a conductor's reflectance is rendered with Schlick's Fresnel term and the roughness \
+                 along u",
             );
             let [u, _] = roughness;
             Material::Metallic {

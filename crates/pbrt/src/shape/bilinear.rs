@@ -3,7 +3,7 @@
 use antumbra_scene::TriangleMesh;
 use glam::{DVec3, Vec2};
 
-use super::mesh::{check_count, check_indices};
+use super::mesh::{MAX_SUBDIVIDED, UV, check_count, check_indices};
 use crate::lookup::Lookup;
 use crate::params::{Param, ParamType, Values};
 use crate::report::Report;
@@ -18,7 +18,6 @@ pub(super) fn bilinear_mesh(
     middle: DVec3,
     report: &mut Report,
 ) -> Option<TriangleMesh> {
-    const UV: &[ParamType] = &[ParamType::Point2, ParamType::Float];
     let errors_before = report.error_count();
     let points = lookup.find("P", &[ParamType::Point3]);
     if points.is_none() {
@@ -65,6 +64,14 @@ pub(super) fn bilinear_mesh(
             uvs => at.map(|k| Vec2::new(uvs[2 * k], uvs[2 * k + 1])),
         };
         patch(&mut mesh, p.map(|p| p - middle), n, uv);
+        if mesh.bytes() > report.sources.limit.min(MAX_SUBDIVIDED) {
+            report.error_help(
+                lookup.at,
+                "the patches make more triangles than memory allows",
+                "take fewer patches, or allow more memory",
+            );
+            return None;
+        }
     }
     Some(mesh)
 }

@@ -13,11 +13,14 @@ use crate::shape::subdivision::{NoSurface, Surface};
 use crate::texture::Textured;
 use crate::transform;
 
-/// Most memory of a subdivision in bytes, for its vertices must be numbered by 32 bits.
-const MAX_SUBDIVIDED: u64 = 64 << 30;
+/// Most memory of a subdivision, or of a grid of patches, in bytes, for its vertices must be numbered by 32 bits.
+pub(super) const MAX_SUBDIVIDED: u64 = 64 << 30;
 
 /// Memory per triangle while a mesh is subdivided, at its peak: 139 bytes were measured.
 const BYTES_PER_TRIANGLE: u64 = 160;
+
+/// Types of texture coordinates.
+pub(super) const UV: &[ParamType] = &[ParamType::Point2, ParamType::Float];
 
 /// Alpha masks of a mesh, which cut it out where a parameter is 0.
 #[derive(Default)]
@@ -76,7 +79,6 @@ pub(super) fn triangle_mesh(
     middle: DVec3,
     report: &mut Report,
 ) -> Option<TriangleMesh> {
-    const UV: &[ParamType] = &[ParamType::Point2, ParamType::Float];
     let errors_before = report.error_count();
     let indices = lookup.find("indices", &[ParamType::Integer]);
     let points = lookup.find("P", &[ParamType::Point3]);

@@ -62,10 +62,6 @@ pub(crate) fn read(
     let now = &values.state.now;
     let is_emitter = now.area_light.is_some() && now.object.is_none();
     let tessellation = Tessellation::of(is_emitter);
-    let known = match values.report.is_version4 {
-        true => [SUPPORTED, SUPPORTED4].concat(),
-        false => SUPPORTED.to_vec(),
-    };
     match kind.text.as_str() {
         "trianglemesh" => {
             let cutouts = mesh::cutouts(values);
@@ -110,6 +106,10 @@ pub(crate) fn read(
         }
         name => {
             values.lookup.ignore_all();
+            let known = match values.report.is_version4 {
+                true => [SUPPORTED, SUPPORTED4].concat(),
+                false => SUPPORTED.to_vec(),
+            };
             if UNSUPPORTED.contains(&name) {
                 let report = &mut values.report;
                 report.unsupported_kind(kind.span, "shape", name, &known);

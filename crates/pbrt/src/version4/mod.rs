@@ -20,7 +20,7 @@ use crate::suggest;
 use crate::texture::{self, TextureSpace};
 
 /// Directives that only version 4 has.
-const DIRECTIVES: &[&str] = &["Attribute", "ColorSpace", "Import", "Option"];
+pub(crate) const DIRECTIVES: &[&str] = &["Attribute", "ColorSpace", "Import", "Option"];
 /// Names that only version 4 has, after their directives.
 const KINDS: &[(&str, &[&str])] = &[
     ("Film", &["rgb", "gbuffer", "spectral"]),
@@ -148,15 +148,12 @@ pub(crate) fn say(file: u32, report: &mut Report) {
     }
 }
 
-/// Directive of version 3 that means the same.
-pub(crate) fn translate(directive: Directive, report: &mut Report) -> Directive {
+/// Makes a directive of version 3 that means the same.
+pub(crate) fn translate(directive: &mut Directive, report: &mut Report) {
     use Directive as D;
     match directive {
-        D::Film(mut kind, mut params) => {
-            film(&mut kind, &mut params, report);
-            D::Film(kind, params)
-        }
-        D::PixelFilter(kind, mut params) => {
+        D::Film(kind, params) => film(kind, params, report),
+        D::PixelFilter(kind, params) => {
             params.rename("xradius", "xwidth");
             params.rename("yradius", "ywidth");
             if kind.text == "gaussian" {
@@ -166,9 +163,8 @@ pub(crate) fn translate(directive: Directive, report: &mut Report) -> Directive 
                     params.default_float(side, 1.5, kind.span);
                 }
             }
-            D::PixelFilter(kind, params)
         }
-        D::Sampler(mut kind, mut params) => {
+        D::Sampler(kind, params) => {
             let name = match kind.text.as_str() {
                 "independent" => "random",
                 "zsobol" | "paddedsobol" | "pmj02bn" => "02sequence",
@@ -181,55 +177,28 @@ pub(crate) fn translate(directive: Directive, report: &mut Report) -> Directive 
             if kind.text == "random" {
                 params.default_integer("pixelsamples", 16, kind.span);
             }
-            D::Sampler(kind, params)
         }
-        D::Integrator(mut kind, mut params) => {
-            integrator(&mut kind, &mut params, report);
-            D::Integrator(kind, params)
-        }
-        D::Material(kind, mut params) => {
-            let kind = material(kind, &mut params, report);
-            D::Material(kind, params)
-        }
-        D::MakeNamedMaterial(name, mut params) => {
+        D::Integrator(kind, params) => integrator(kind, params, report),
+        D::Material(kind, params) => material(kind, params, report),
+        D::MakeNamedMaterial(name, params) => {
             if let Some(text) = params.string("type").map(str::to_owned) {
                 let span = params.find("type").map_or(name.span, |param| param.value);
-                let kind = material(Quoted { text, span }, &mut params, report);
+                let mut kind = Quoted { text, span };
+                material(&mut kind, params, report);
                 params.set_string("type", kind.text);
             }
-            D::MakeNamedMaterial(name, params)
         }
-        D::MakeNamedMedium(name, mut params) => {
-            medium(&mut params, report);
-            D::MakeNamedMedium(name, params)
-        }
-        D::Texture {
-            name,
-            value_type,
-            mut class,
-            mut params,
-        } => {
-            image_or_scale(&mut class, &mut params, report);
-            D::Texture {
-                name,
-                value_type,
-                class,
-                params,
-            }
-        }
-        D::LightSource(kind, mut params) => {
+        D::MakeNamedMedium(_, params) => medium(params, report),
+        D::Texture { class, params, .. } => image_or_scale(class, params, report),
+        D::LightSource(kind, params) => {
             params.widen("scale");
             if kind.text == "projection" {
                 params.rename("filename", "mapname");
                 params.default_float("fov", 90.0, kind.span);
             }
-            D::LightSource(kind, params)
         }
-        D::AreaLightSource(kind, mut params) => {
-            params.widen("scale");
-            D::AreaLightSource(kind, params)
-        }
-        other => other,
+        D::AreaLightSource(_, params) => params.widen("scale"),
+        _ => {}
     }
 }
 
@@ -313,14 +282,13 @@ fn integrator(kind: &mut Quoted, params: &mut Params, report: &mut Report) {
 }
 
 /// Renames parameters of a material, and its kind where version 3 has it under another name.
-fn material(mut kind: Quoted, params: &mut Params, report: &mut Report) -> Quoted {
+fn material(kind: &mut Quoted, params: &mut Params, report: &mut Report) {
     params.rename("displacement", "bumpmap");
     match kind.text.as_str() {
         "interface" => kind.text = "none".into(),
         "measured" => {
             report.unsupported(kind.span, "material \"measured\" of pbrt-v4 is");
-            params.list.retain(|param| param.name == "type");
-            kind.text = "matte".into();
+            refuse(kind, params);
         }
         "hair" => params.rename("reflectance", "color"),
         "subsurface" => {
@@ -348,12 +316,20 @@ fn material(mut kind: Quoted, params: &mut Params, report: &mut Report) -> Quote
                         params.set_text(to, name, kind.span);
                     }
                 }
-                Err(place) => report.error(place, "\"materials\" of a mix are two names"),
+                Err(place) => {
+                    report.error(place, "\"materials\" of a mix are two names");
+                    refuse(kind, params);
+                }
             }
         }
         _ => {}
     }
-    kind
+}
+
+/// Makes a matte material of one that was reported, so that no further mistakes follow.
+fn refuse(kind: &mut Quoted, params: &mut Params) {
+    params.list.retain(|param| param.name == "type");
+    kind.text = "matte".into();
 }
 
 /// Makes microfacet alphas of roughnesses: in version 4 their square roots.
@@ -545,14 +521,11 @@ pub(crate) fn color_space(name: &Quoted, report: &mut Report) -> Option<DMat3> {
         return None;
     };
     (*known != "srgb").then(|| {
-        let of = |primaries: &Primaries| {
-            let columns = primaries.map(crate::spectrum::from_chromaticity);
-            let matrix = DMat3::from_cols(columns[0], columns[1], columns[2]);
-            let share = matrix.inverse() * columns[3];
-            // White, the sum of the primaries, stays white, whatever its colour.
-            DMat3::from_diagonal(columns[3].recip()) * matrix * DMat3::from_diagonal(share)
-        };
-        of(primaries)
+        let [red, green, blue, white] = primaries.map(crate::spectrum::from_chromaticity);
+        let matrix = DMat3::from_cols(red, green, blue);
+        let share = matrix.inverse() * white;
+        // White, the sum of the primaries, stays white, whatever its colour.
+        DMat3::from_diagonal(white.recip()) * matrix * DMat3::from_diagonal(share)
     })
 }
 

@@ -211,8 +211,14 @@ fn surfaces_are_seen_under_daylight() {
     let expected = 0.4 * 1.6605 + 0.1 * (-0.5876 - 0.0728);
     assert!((red.x - expected).abs() < 2e-3, "{red}");
     // The space ends with its block.
-    let text = r#"AttributeBegin ColorSpace "aces2065-1" AttributeEnd Material "diffuse" "rgb reflectance" [.1 .2 .3]"#;
-    assert_eq!(kd(text), Rgb::new(0.1, 0.2, 0.3));
+    for (begin, end) in [
+        ("AttributeBegin", "AttributeEnd"),
+        ("ObjectBegin \"o\"", "ObjectEnd"),
+    ] {
+        let block = format!("{begin} ColorSpace \"aces2065-1\" {end}");
+        let text = format!("{block} Material \"diffuse\" \"rgb reflectance\" [.1 .2 .3]");
+        assert_eq!(kd(&text), Rgb::new(0.1, 0.2, 0.3), "{begin}");
+    }
 }
 
 /// Names outlive their blocks and may be used before they are defined.
@@ -381,6 +387,16 @@ fn the_version_is_said_in_one_sentence() {
             "WorldBegin",
             "WorldBegin Attribute \"shapes\" \"float radius\" 1",
             "did you mean \"shape\"?",
+        ),
+        (
+            "WorldBegin",
+            "WorldBegin LightSource \"infinite\" \"blackbody L\" [6500 2]",
+            "one temperature, found 2",
+        ),
+        (
+            "WorldBegin",
+            "WorldBegin Material \"mix\" \"string materials\" \"a\"",
+            "two names",
         ),
     ] {
         let Err(Error::Scene(mistakes)) = load_text(&NEW.replace(of, by)) else {

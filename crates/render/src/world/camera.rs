@@ -162,7 +162,8 @@ impl Camera {
         [Vec3::X * x, Vec3::Y * y].map(|further| self.to_world(org, dir + further))
     }
 
-    /// Distance of a point from the camera along its axis, in units of the world. Distance from its place if it sees all around.
+    /// Distance of a point from the camera along its axis, in units of the world. Distance from the place of a camera that sees
+    /// all around.
     pub fn depth(&self, point: Vec3) -> f32 {
         if self.projection.is_all_around() {
             return point.distance(self.eye);
