@@ -173,7 +173,7 @@ impl Side {
     }
 }
 
-/// What a side has to know of its open rays.
+/// Result that is wanted from the open rays of a side.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Wanted {
     Parts,

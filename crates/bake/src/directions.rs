@@ -21,7 +21,7 @@ pub enum Weighting {
     Uniform,
 }
 
-/// Samples of the table; those behind it are computed each time.
+/// Most samples of the table.
 const MOST: u32 = 1 << 12;
 
 /// Samples of a hemisphere, for all points.
@@ -61,7 +61,7 @@ fn fraction(bits: u32) -> f64 {
 }
 
 impl Samples {
-    /// For up to `count` samples a point; there are more, but they take longer.
+    /// Table for up to `count` samples per point. Further samples are computed each time.
     pub fn new(count: u32, weighting: Weighting) -> Self {
         Self {
             weighting,

@@ -16,7 +16,7 @@ pub struct HeightField<'a> {
     width: usize,
     height: usize,
     rows: &'a [f64],
-    /// The same heights, column by column.
+    /// Heights column by column.
     columns: Vec<f64>,
     /// Tops of rows and of columns: see [`tops`].
     tops: [Vec<f64>; 2],
@@ -35,7 +35,8 @@ impl<'a> HeightField<'a> {
     /// order of GDAL: `x = t[0] + c t[1] + r t[2]` and `y = t[3] + c t[4] + r t[5]`.
     ///
     /// # Errors
-    /// [`Error::Length`] if there are not as many heights as cells, [`Error::Range`] if cells have no size, [`Error::NoMemory`].
+    /// [`Error::Length`] if there are not as many heights as cells, [`Error::Range`] if cells have no size or their number is not
+    /// within 1 to 2³² - 1, [`Error::NoMemory`].
     pub fn new(
         [width, height]: [usize; 2],
         heights: &'a [f64],
@@ -50,11 +51,19 @@ impl<'a> HeightField<'a> {
                 wanted: "a number above 0",
             });
         }
-        if heights.len() != width * height || heights.len() > u32::MAX as usize {
+        let cells = width.saturating_mul(height);
+        if heights.len() != cells {
             return Err(Error::Length {
                 what: "heights",
                 found: heights.len(),
-                wanted: width * height,
+                wanted: cells,
+            });
+        }
+        if cells == 0 || cells > u32::MAX as usize {
+            return Err(Error::Range {
+                what: "number of cells",
+                found: cells as f64,
+                wanted: "1 to 4294967295",
             });
         }
         let mut columns = memory::room("heights", heights.len())?;
@@ -168,8 +177,10 @@ impl<'a> HeightField<'a> {
         let [left, top] = [square(column, self.width), square(row, self.height)];
         let [u, v] = [column - left as f64, row - top as f64];
         let at = |c: usize, r: usize| {
-            let height = self.rows.get((top + r) * self.width + left + c);
-            height.copied().filter(|height| height.is_finite())
+            let [column, row] = [left + c, top + r];
+            let index = (column < self.width).then_some(row * self.width + column)?;
+            let height = self.rows.get(index).copied();
+            height.filter(|height| height.is_finite())
         };
         // A corner that does not count may be missing.
         let corners = [at(0, 0), at(1, 0), at(0, 1), at(1, 1)];

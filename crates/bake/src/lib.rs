@@ -59,9 +59,9 @@
 //!
 //! # Jobs
 //!
-//! Long bakes are jobs: [`OcclusionJob`], [`SunJob`], [`VisibilityJob`] and [`ViewshedJob`]. A [`Job`] has numbered items, and [`Work`] computes
-//! them in chunks, which can be kept in files, resumed, and shared among machines. [`learn_when_it_pays`] makes a tree that
-//! learned from rays of the job. [`Sensors`] and [`Atlas`] make points of meshes, grids, tables and textures.
+//! Long bakes are jobs: [`OcclusionJob`], [`SunJob`], [`VisibilityJob`] and [`ViewshedJob`]. A [`Job`] has numbered items, and
+//! [`Work`] computes them in chunks, which can be kept in files, resumed, and shared among machines. [`learn_when_it_pays`] makes
+//! a tree that learned from rays of the job. [`Sensors`] and [`Atlas`] make points of meshes, grids, tables and textures.
 //!
 //! # Files
 //! - `job`: jobs and their keys;  `work`, `part`: chunks of a job, and files of them;  `learn`: trees that learn from a job
@@ -71,7 +71,7 @@
 //! - `ambient_occlusion`: the open part of the sky above points
 //! - `view_factors`: light that goes from surface to surface
 //! - `curvature`: lines of sight over a round earth
-//! - `viewshed`: what observers see of a height field, `height_field`;  `sweep`, `horizon`: its edges as an eye sees them
+//! - `viewshed`: cells of a `height_field` that observers see;  `sweep`, `horizon`: edges of the field as an eye sees them
 //! - `visibility`: directions and points that points see;  `exposure`: sums of what they see
 //! - `sky`: the sky in patches;  `sun`: where the sun stands;  `moment`, `clock`: dates, times of day and time zones
 //! - `hourly`: values step by step;  `measures`: classes of sunlight, reflected light

@@ -1,6 +1,7 @@
 //! Viewsheds of height fields: the cells that observers see, exactly and without rays.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use antumbra::Bvh;
 use rayon::prelude::*;
@@ -106,17 +107,17 @@ impl ViewshedJob<'_> {
         let [width, _] = self.field.size();
         let [_, a, b, _, d, e] = self.field.transform();
         for (index, word) in seen.iter_mut().enumerate() {
-            for bit in (0..64)
-                .filter(|bit| *word >> bit & 1 != 0)
-                .collect::<Vec<_>>()
-            {
+            let seen = *word;
+            for bit in (0..64).filter(|bit| seen >> bit & 1 != 0) {
                 let cell = 64 * index + bit;
                 let [x, y] = [
                     (cell % width) as f64 - observer.place[0],
                     (cell / width) as f64 - observer.place[1],
                 ];
-                let up = self.field.heights()[cell] + self.target - observer.height;
-                let apart = [a * x + b * y, d * x + e * y, up];
+                let [east, north] = [a * x + b * y, d * x + e * y];
+                let drop = self.drop * (east * east + north * north);
+                let up = self.field.heights()[cell] + self.target - drop - observer.height;
+                let apart = [east, north, up];
                 if apart != [0.0; 3] && dot(observer.normal, apart) <= 0.0 {
                     *word &= !(1 << bit);
                 }
@@ -158,7 +159,7 @@ impl Job for ViewshedJob<'_> {
         monitor: &dyn Monitor,
     ) -> Result<Vec<u8>, Error> {
         let total = items.len();
-        let done = std::sync::atomic::AtomicUsize::new(0);
+        let done = AtomicUsize::new(0);
         let found: Result<Vec<Vec<u8>>, Error> = items
             .into_par_iter()
             .map(|item| {
@@ -166,7 +167,7 @@ impl Job for ViewshedJob<'_> {
                     return Err(Error::Cancelled);
                 }
                 let runs = self.runs(&self.observers[item]);
-                let before = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                let before = done.fetch_add(1, Ordering::Relaxed);
                 monitor.progress(before + 1, total);
                 runs
             })

@@ -102,6 +102,16 @@ struct Case {
 }
 
 impl Case {
+    /// A surface on a flat earth, all of which is in range.
+    fn level(raster: Raster) -> Self {
+        Self {
+            raster,
+            target: 0.0,
+            drop: 0.0,
+            range: f64::INFINITY,
+        }
+    }
+
     fn field(&self) -> HeightField<'_> {
         let grid = &self.raster.grid;
         HeightField::new(
@@ -301,12 +311,7 @@ fn lines_may_touch_a_plane() {
     for (cell, value) in raster.values.iter_mut().enumerate() {
         *value = slope((cell % 60) as f64, (cell / 60) as f64);
     }
-    let case = Case {
-        raster,
-        target: 0.0,
-        drop: 0.0,
-        range: f64::INFINITY,
-    };
+    let case = Case::level(raster);
     let on = case.observer([17.3, 22.8], 0.0).expect("a surface");
     let below = Observer {
         height: on.height - 0.01,
@@ -319,12 +324,7 @@ fn lines_may_touch_a_plane() {
 
 #[test]
 fn nothing_behind_a_normal_is_seen() {
-    let case = Case {
-        raster: hills([30, 20], PLAIN, 0.0, 1),
-        target: 0.0,
-        drop: 0.0,
-        range: f64::INFINITY,
-    };
+    let case = Case::level(hills([30, 20], PLAIN, 0.0, 1));
     let free = case.observer([15.0, 10.0], 1000.0).expect("a surface");
     let facing = Observer {
         normal: [1.0, 0.0, 0.0],
@@ -334,16 +334,26 @@ fn nothing_behind_a_normal_is_seen() {
     for (cell, count) in counts.into_iter().enumerate() {
         assert_eq!(count == 1, cell % 30 > 15, "{cell}");
     }
+    // A wall that is higher than the eye, but sinks below it on a round earth.
+    let mut raster = hills([30, 20], PLAIN, 0.0, 0);
+    for (cell, value) in raster.values.iter_mut().enumerate() {
+        *value = if cell % 30 == 29 { 10.0 } else { 0.0 };
+    }
+    let mut case = Case::level(raster);
+    let eye = case.observer([15.0, 10.0], 5.0).expect("a surface");
+    let upwards = Observer {
+        normal: [0.0, 0.0, 1.0],
+        ..eye
+    };
+    for (drop, seen) in [(0.0, 20), (0.03, 0)] {
+        case.drop = drop;
+        assert_eq!(case.run(&[upwards]).counts().iter().sum::<u32>(), seen);
+    }
 }
 
 #[test]
 fn shares_and_threads_have_the_same_bits() {
-    let case = Case {
-        raster: hills([80, 60], PLAIN, 0.05, 3),
-        target: 0.0,
-        drop: 0.0,
-        range: f64::INFINITY,
-    };
+    let case = Case::level(hills([80, 60], PLAIN, 0.05, 3));
     let observers: Vec<Observer> = (0..40)
         .filter_map(|i| case.observer([f64::from(i) * 1.9, f64::from(i) * 1.4], 3.0))
         .collect();
@@ -390,6 +400,8 @@ fn what_is_no_field_is_refused() {
     let heights = [0.0; 6];
     let error = HeightField::new([2, 2], &heights, PLAIN).expect_err("a length");
     assert!(matches!(error, Error::Length { found: 6, .. }));
+    let error = HeightField::new([0, 5], &[], PLAIN).expect_err("a number of cells");
+    assert!(matches!(error, Error::Range { found: 0.0, .. }));
     let flat = [0.0, 1.0, 2.0, 0.0, 2.0, 4.0];
     assert!(matches!(
         HeightField::new([3, 2], &heights, flat),
@@ -400,28 +412,20 @@ fn what_is_no_field_is_refused() {
     for (cell, value) in raster.values.iter_mut().enumerate() {
         *value = [0.0, 0.0, 0.0, f64::NAN, 50.0, f64::NAN, 0.0, 0.0, 0.0][cell / 40];
     }
-    let case = Case {
-        raster,
-        target: 0.0,
-        drop: 0.0,
-        range: f64::INFINITY,
-    };
+    let case = Case::level(raster);
     let observer = case.observer([20.0, 0.0], 1.0).expect("a surface");
     assert_eq!(case.run(&[observer]).counts().iter().sum::<u32>(), 7 * 40);
     // Neither has a raster of one row.
-    let wall = [0.0, 9.0, 0.0, 9.0, 0.0, 0.0];
-    let field = HeightField::new([6, 1], &wall, PLAIN).expect("a field");
-    let observers = [Observer {
+    let mut raster = hills([6, 1], PLAIN, 0.0, 0);
+    raster.values = vec![0.0, 9.0, 0.0, 9.0, 0.0, 0.0];
+    let observer = Observer {
         place: [0.0, 0.0],
         height: 1.0,
         normal: [0.0; 3],
-    }];
-    let job = ViewshedJob {
-        field: &field,
-        observers: &observers,
-        target: 0.0,
-        drop: 0.0,
-        range: f64::INFINITY,
     };
-    assert_eq!(run(&job, &tree(), &()).expect("viewsheds").counts(), [1; 6]);
+    assert_eq!(Case::level(raster).run(&[observer]).counts(), [1; 6]);
+    for size in [[1, 6], [6, 1]] {
+        let field = HeightField::new(size, &heights, PLAIN).expect("a field");
+        assert_eq!(field.surface([0.0; 2]), None, "{size:?}");
+    }
 }

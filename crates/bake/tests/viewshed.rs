@@ -62,7 +62,7 @@ impl Terrain {
             .collect()
     }
 
-    /// The same cells as a height field has them.
+    /// Cells that each observer sees, swept as a height field.
     fn swept(&self, observers: &[usize], eye: f64) -> Vec<Vec<bool>> {
         let grid = &self.raster.grid;
         let size = [grid.width, grid.height];

@@ -14,7 +14,7 @@ use antumbra_load::{
     check_picture,
 };
 use antumbra_render::{Camera, World};
-use antumbra_scene::{Image, Pixels, Sampler, Scene};
+use antumbra_scene::{Image, Pixels, Projection, Sampler, Scene};
 
 use crate::args::{CameraArgs, PictureArgs, PoseArgs};
 use crate::exit::{self, Failure, say, tell};
@@ -39,14 +39,19 @@ pub fn set_tolerance(strict: bool, skip_unsupported: bool) {
     SKIP.store(skip_unsupported, Ordering::Relaxed);
 }
 
-/// Reads or generates a scene, and prints the reader's warnings and notes.
-pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
-    let reading = progress::doing(&name.to_string_lossy(), "reading");
-    let options = Options {
+/// Options of readers, with the tolerance that was set.
+fn options(max_memory: MemorySize) -> Options {
+    Options {
         max_memory,
         strict: STRICT.load(Ordering::Relaxed),
         skip_unsupported: SKIP.load(Ordering::Relaxed),
-    };
+    }
+}
+
+/// Reads or generates a scene, and prints the reader's warnings and notes.
+pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
+    let reading = progress::doing(&name.to_string_lossy(), "reading");
+    let options = options(max_memory);
     let loaded = match name == Path::new(STDIN) {
         true => antumbra_load::load_text(standard_input(max_memory)?, &options),
         false => antumbra_load::load(name, &options),
@@ -87,12 +92,7 @@ pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
 /// Reads a height raster without making a mesh of it, and prints the reader's warnings.
 pub fn load_heights(name: &Path, max_memory: MemorySize) -> Result<Heights, Failure> {
     let reading = progress::doing(&name.to_string_lossy(), "reading");
-    let options = Options {
-        max_memory,
-        strict: STRICT.load(Ordering::Relaxed),
-        skip_unsupported: false,
-    };
-    let heights = antumbra_load::load_heights(name, &options);
+    let heights = antumbra_load::load_heights(name, &options(max_memory));
     drop(reading);
     interrupt::check()?;
     let heights = heights?;
@@ -271,6 +271,11 @@ fn pose(loaded: &mut Loaded, args: &PoseArgs, stage: Stage) -> Result<(), Failur
         None => {}
     }
     if let Some(fov) = args.fov {
+        if scene.camera.projection != Projection::Perspective {
+            let name = &scene.name;
+            let reason = format!("--fov is for perspective cameras: {name} has another one");
+            return Err(Failure::Usage(reason));
+        }
         scene.camera.fov = fov;
     }
     if let Some(look) = &args.camera {

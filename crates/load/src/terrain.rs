@@ -41,7 +41,7 @@ pub struct Heights {
     pub raster: Raster,
     /// Box around the centres of cells with data, in map coordinates; `None` without data.
     pub extent: Option<Extent>,
-    /// What speaks against the raster being in one unit of length.
+    /// Doubts that the raster is in one unit of length.
     pub warnings: Vec<Warning>,
     /// Other files that were read.
     pub inputs: Vec<PathBuf>,
@@ -58,18 +58,15 @@ pub fn load_heights(path: &Path, options: &Options) -> Result<Heights, Error> {
         return Err(Error::Strict(warnings));
     }
     let width = raster.grid.width;
-    let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-    for (cell, &z) in raster.values.iter().enumerate() {
-        if z.is_finite() {
-            let [x, y] = raster.grid.centre(cell % width, cell / width);
-            let point = DVec3::new(x, y, z);
-            (low, high) = (low.min(point), high.max(point));
-        }
-    }
-    let extent = Extent { low, high };
+    let cells = raster.values.iter().enumerate();
+    let centres = cells.map(|(cell, &z)| {
+        let [x, y] = raster.grid.centre(cell % width, cell / width);
+        [x, y, z]
+    });
+    let extent = Extent::around(centres);
     Ok(Heights {
         raster,
-        extent: (low.x <= high.x).then_some(extent),
+        extent,
         warnings,
         inputs: companions(path),
     })

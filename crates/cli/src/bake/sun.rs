@@ -62,8 +62,8 @@ pub struct Baked<'a> {
     pub args: &'a SunArgs,
     when: &'a When,
     /// Name of the weather.
-    pub weather: Option<&'a str>,
-    pub up: UpAxis,
+    weather: Option<&'a str>,
+    up: UpAxis,
 }
 
 /// Refuses outputs that cannot be made, before anything is read.

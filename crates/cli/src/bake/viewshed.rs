@@ -12,13 +12,14 @@ use antumbra_lab::count;
 use antumbra_load::{Extent, Heights, MemorySize};
 use antumbra_raster::{Quantity, RasterCells};
 
-use super::chunks::{self, PartFile};
+use super::chunks;
 use super::command::{Bake, text};
 use super::files::{self, Format};
 use super::raster;
-use super::visible::{self, Document, Ends, Points};
+use super::visible::{self, Document, Ends};
 use crate::args::VisibleArgs;
 use crate::exit::{Failure, tell};
+use crate::output::Files;
 use crate::{input, interrupt, json, scenes};
 
 /// Name of the value in files.
@@ -35,23 +36,14 @@ pub fn is_of_cells(args: &VisibleArgs) -> bool {
         && raster::is_raster(&args.scene)
 }
 
-/// Runs the command, or merges parts of it.
+/// Runs the command, or merges parts of it. `files` has all files but those that are read with the raster.
 pub fn run(
     args: &VisibleArgs,
+    bake: &Bake<'_>,
+    mut files: Files,
     isa: Isa,
     memory: MemorySize,
-    parts: Option<&[PartFile]>,
 ) -> Result<(), Failure> {
-    let bake = Bake {
-        scene: &args.scene,
-        outputs: &args.output,
-        json: args.json.as_ref(),
-        chunks: &args.chunks,
-        machine: &args.machine,
-        parts,
-        earth: None,
-    };
-    let mut files = visible::declare(args, &bake)?;
     bake.machine.start_threads()?;
     let name = args.scene.file_stem().unwrap_or_default();
     let name = name.to_string_lossy().into_owned();
@@ -163,7 +155,6 @@ struct Table {
     observers: Vec<Observer>,
     /// Points of the world; where the table leaves out heights, points are on the surface.
     points: Vec<[f64; 3]>,
-    sensors: Sensors,
 }
 
 impl Table {
@@ -198,29 +189,9 @@ impl Table {
                     .map_or([0.0; 3], |normal| normal.map(f64::from)),
             });
         }
-        let longest = extent.size().max_element();
-        let is_far = |point: &&[f64; 3]| {
-            let mut axes = 0..3;
-            axes.any(|axis| {
-                point[axis] < extent.low[axis] - longest
-                    || point[axis] > extent.high[axis] + longest
-            })
-        };
-        let far = points.iter().filter(is_far).count();
-        if far > 0 {
-            tell(format_args!(
-                "warning: {name}: {far} of {} points are farther outside the raster than its extent of {longest}: it runs from \
-                 {:?} to {:?}; check units, axes and origin",
-                points.len(),
-                extent.low.to_array(),
-                extent.high.to_array(),
-            ));
-        }
-        Ok(Self {
-            observers,
-            points,
-            sensors,
-        })
+        let ends = [extent.low, extent.high].map(|corner| corner.to_array());
+        visible::warn_of_far(path, points.iter().copied(), ("raster", ends));
+        Ok(Self { observers, points })
     }
 }
 
@@ -280,21 +251,6 @@ fn write(
         .iter()
         .map(|&cell| counts[cell as usize])
         .collect();
-    let points = || {
-        let mut columns = table.sensors.clone();
-        columns.points = table
-            .points
-            .iter()
-            .map(|&point| local.local(point))
-            .collect();
-        let mut rows = rows.clone();
-        rows.normals = Vec::new();
-        Points {
-            rows,
-            columns: Some(columns),
-            is_viewshed: true,
-        }
-    };
     for (path, format) in others {
         match format {
             Format::Csv => {
@@ -306,7 +262,10 @@ fn write(
             Format::Npz => {
                 let matrix = found.matrix(&cells.cells)?;
                 let counts: Vec<u64> = seen.iter().map(|&count| u64::from(count)).collect();
-                visible::npz(path, &points(), local, &matrix, &counts)?;
+                let observers = table.points.iter().map(|&point| local.local(point));
+                let observers: Vec<[f32; 3]> = observers.collect();
+                let places = [&rows.points[..], &observers];
+                visible::npz(path, (true, places, local), &matrix, &counts)?;
             }
             _ => {
                 let values: Vec<f32> = seen.iter().map(|&count| count as f32).collect();

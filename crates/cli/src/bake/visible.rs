@@ -20,7 +20,6 @@ use super::map::{self, Plan, Words};
 use super::{raster, viewshed};
 use crate::args::VisibleArgs;
 use crate::exit::{Failure, tell};
-use crate::output::Files;
 use crate::{interrupt, json, output};
 
 /// The JSON document.
@@ -74,11 +73,11 @@ fn line_format(path: &Path) -> Result<Format, Failure> {
 
 /// Points in question, and their eyes, which are the ends of lines of sight. Places of a viewshed have the rows, since
 /// there are more of them than observers.
-pub struct Points {
-    pub rows: Sensors,
+struct Points {
+    rows: Sensors,
     /// Points of columns; `None` if rows and columns have the same.
-    pub columns: Option<Sensors>,
-    pub is_viewshed: bool,
+    columns: Option<Sensors>,
+    is_viewshed: bool,
 }
 
 impl Points {
@@ -107,9 +106,8 @@ impl Points {
         })
     }
 
-    /// Warns of points of the tables that are farther outside the mesh than the mesh is long: their units, axes or origin
-    /// are probably others.
-    fn warn_of_far_ones(&self, args: &VisibleArgs, bounds: &Aabb) {
+    /// Warns of points of the tables that are far outside the mesh: see [`warn_of_far`].
+    fn warn_of_far_ones(&self, args: &VisibleArgs, bounds: &Aabb, local: LocalOrigin) {
         let tables = match (&self.columns, self.is_viewshed) {
             (Some(observers), true) => [Some((&args.from, observers)), None],
             _ => [
@@ -117,27 +115,10 @@ impl Points {
                 args.to.as_ref().zip(self.columns.as_ref()),
             ],
         };
-        let size = |axis: usize| bounds.max[axis] - bounds.min[axis];
-        let extent = size(0).max(size(1)).max(size(2));
+        let ends = [bounds.min, bounds.max].map(|corner| local.world(corner));
         for (path, sensors) in tables.into_iter().flatten() {
-            let is_far = |point: &&[f32; 3]| {
-                let mut axes = 0..3;
-                axes.any(|axis| {
-                    let (low, high) = (bounds.min[axis], bounds.max[axis]);
-                    point[axis] < low - extent || point[axis] > high + extent
-                })
-            };
-            let far = sensors.points.iter().filter(is_far).count();
-            if far > 0 {
-                tell(format_args!(
-                    "warning: {}: {far} of {} points are farther outside the mesh than its extent of {extent}: the mesh \
-                     runs from {:?} to {:?}; check units, axes and origin",
-                    path.display(),
-                    sensors.points.len(),
-                    bounds.min,
-                    bounds.max,
-                ));
-            }
+            let points = sensors.points.iter().map(|&point| local.world(point));
+            warn_of_far(path, points, ("mesh", ends));
         }
     }
 
@@ -178,6 +159,31 @@ impl Points {
     }
 }
 
+/// Warns of points of a table that are farther outside a surface than the surface is long: their units, axes or origin are
+/// probably others. Points and the corners of the surface are in coordinates of the world.
+pub fn warn_of_far(
+    path: &Path,
+    points: impl ExactSizeIterator<Item = [f64; 3]>,
+    (surface, [low, high]): (&str, [[f64; 3]; 2]),
+) {
+    let of = points.len();
+    let extent = (0..3).fold(0.0, |most: f64, axis| most.max(high[axis] - low[axis]));
+    let is_far = |point: &[f64; 3]| {
+        (0..3).any(|axis| point[axis] < low[axis] - extent || point[axis] > high[axis] + extent)
+    };
+    let far = points.filter(is_far).count();
+    if far > 0 {
+        // Single precision has as many digits as somebody reads.
+        let [low, high] = [low, high].map(|corner| corner.map(|x| x as f32));
+        tell(format_args!(
+            "warning: {}: {far} of {of} points are farther outside the {surface} than its extent of {}: the {surface} runs \
+             from {low:?} to {high:?}; check units, axes and origin",
+            path.display(),
+            extent as f32,
+        ));
+    }
+}
+
 /// Runs the command, or merges parts of it.
 pub fn run(
     args: &VisibleArgs,
@@ -187,9 +193,6 @@ pub fn run(
     let isa = args.machine.isa()?;
     if args.chunks.shard.is_none() {
         check(args)?;
-    }
-    if viewshed::is_of_cells(args) {
-        return viewshed::run(args, isa, memory, parts);
     }
     let bake = Bake {
         scene: &args.scene,
@@ -204,12 +207,24 @@ pub fn run(
             up: args.up,
         }),
     };
-    let mut files = declare(args, &bake)?;
+    let from = ("the points", Some(args.from.as_path()));
+    let to = ("the points", args.to.as_deref());
+    let world_files = map::world_files(&args.output);
+    let mut written = vec![("--lines", args.lines.as_deref())];
+    written.extend(
+        world_files
+            .iter()
+            .map(|path| ("the world file", Some(&**path))),
+    );
+    let mut files = bake.declare(&written, &[from, to])?;
+    if viewshed::is_of_cells(args) {
+        return viewshed::run(args, &bake, files, isa, memory);
+    }
     let ground = bake.ground(isa, memory, &mut files)?;
     let up = ground.up(args.up)?;
     let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
     let points = Points::read(args, &ground, &plan)?;
-    points.warn_of_far_ones(args, &ground.bvh.bounds());
+    points.warn_of_far_ones(args, &ground.bvh.bounds(), ground.local);
     let (rows, columns) = points.eyes(args, &ground, &plan);
     let job = VisibilityJob {
         rows: &rows,
@@ -282,20 +297,6 @@ pub fn run(
     Ok(())
 }
 
-/// Notes all files, and checks that outputs can be written.
-pub fn declare(args: &VisibleArgs, bake: &Bake<'_>) -> Result<Files, Failure> {
-    let from = ("the points", Some(args.from.as_path()));
-    let to = ("the points", args.to.as_deref());
-    let world_files = map::world_files(&args.output);
-    let mut written = vec![("--lines", args.lines.as_deref())];
-    written.extend(
-        world_files
-            .iter()
-            .map(|path| ("the world file", Some(&**path))),
-    );
-    bake.declare(&written, &[from, to])
-}
-
 /// Writes all files but the lines of sight.
 fn write(
     args: &VisibleArgs,
@@ -314,7 +315,11 @@ fn write(
     };
     let (rows, local) = (&points.rows, ground.local);
     let each = |path: &PathBuf| match Format::of_sensors(path)? {
-        Format::Npz => npz(path, points, local, matrix, &counts),
+        Format::Npz => {
+            let columns = points.columns.as_ref().unwrap_or(rows);
+            let places = [&rows.points[..], &columns.points];
+            npz(path, (points.is_viewshed, places, local), matrix, &counts)
+        }
         Format::Csv => {
             let labels = (&[][..], &rows.labels[..]);
             files::table(path, (&rows.points, local), labels, (name, 40), |row| {
@@ -352,17 +357,16 @@ fn write(
     args.output.iter().try_for_each(each)
 }
 
+/// Writes a matrix as arrays, with the places of its rows and columns.
 pub fn npz(
     path: &Path,
-    points: &Points,
-    local: LocalOrigin,
+    (is_viewshed, [rows, columns], local): (bool, [&[[f32; 3]]; 2], LocalOrigin),
     matrix: &BitMatrix,
     counts: &[u64],
 ) -> Result<(), Failure> {
     let column_counts = matrix.count_columns();
     let shape = [matrix.rows() as u64, matrix.columns() as u64];
-    let columns = points.columns.as_ref().unwrap_or(&points.rows);
-    let [row_name, column_name] = match points.is_viewshed {
+    let [row_name, column_name] = match is_viewshed {
         true => ["to", "from"],
         false => ["from", "to"],
     };
@@ -371,8 +375,8 @@ pub fn npz(
         Entry::new("shape", Array::Counts(&shape)),
         Entry::new("row_counts", Array::Counts(counts)),
         Entry::new("column_counts", Array::Counts(&column_counts)),
-        Entry::new(row_name, Array::Places(&points.rows.points, local)),
-        Entry::new(column_name, Array::Places(&columns.points, local)),
+        Entry::new(row_name, Array::Places(rows, local)),
+        Entry::new(column_name, Array::Places(columns, local)),
     ];
     files::npz(path, &entries)
 }

@@ -163,7 +163,7 @@ fn steps_of_time_add_up_to_the_sums() {
             .sum();
         assert!((total - sum).abs() < 1e-6, "{name}");
     }
-    // The same as arrays: the values of the day, one row after the other, as 32-bit floats.
+    // Arrays have the values of the day as 32-bit floats, row by row, and the beginnings of the steps in Unix time.
     place.sun_on(&["--sensors", "two.csv", "--hourly", "steps.npz"]);
     let arrays = fs::read(place.path("steps.npz")).expect("arrays");
     let wanted: Vec<u8> = (0..24)
@@ -174,6 +174,10 @@ fn steps_of_time_add_up_to_the_sums() {
         })
         .collect();
     assert!(arrays.windows(wanted.len()).any(|bytes| bytes == wanted));
+    // Local clocks at 16.4 degrees east are an hour ahead.
+    let times = (0..24).flat_map(|hour| f64::from(1_750_460_400 + 3600 * hour).to_le_bytes());
+    let times: Vec<u8> = times.collect();
+    assert!(arrays.windows(times.len()).any(|bytes| bytes == times));
     let bad = ["sun", "house.obj", "-o", "a.csv", "--hourly", "a.txt"];
     let run = place.run(&[&bad[..], &["--grid", "1"], &DAY].concat());
     assert!(
