@@ -246,13 +246,13 @@ fn write_pictures(
     Ok(())
 }
 
-/// Two sentences for a newcomer.
+/// Some sentences for a newcomer.
 fn conclusion(sky: &Gain, shadow: &Gain) -> String {
     format!(
         "{DIRECTORY}/city.png shows the city three times: in sunlight, by how much of the sky each place sees, and by \
-         its hours of sun on 21 June.\nA tree that learned from a few of these rays answered others {:.2} times as fast \
-         as a tree that learned nothing (rays to the sky; {:.2} for rays to the lights; medians of {} turns on one \
-         thread), and every answer was the same.",
+         its hours of sun on 21 June.\nA tree that learned from a few of these rays answers others {:.2} times as fast \
+         as a tree that learned nothing. Rays to lights: {:.2}.\nEvery answer is the same. Medians of {} interleaved \
+         rounds on one thread.",
         sky.median, shadow.median, sky.turns,
     )
 }

@@ -6,7 +6,7 @@ use antumbra::recipe::Builder;
 use antumbra::{Isa, Width};
 use antumbra_lab::{Machine, count};
 use antumbra_load::{IntegratorKind, Loaded, MemorySize};
-use antumbra_scene::{Geometry, Light, Material, Scene};
+use antumbra_scene::{Geometry, Light, Material, Projection, Scene};
 use glam::DVec3;
 use serde::Serialize;
 
@@ -103,7 +103,9 @@ struct LoadTimes {
 struct CameraInfo {
     position: [f64; 3],
     direction: [f32; 3],
-    fov_degrees: f32,
+    projection: &'static str,
+    /// `null` if the projection is not perspective.
+    fov_degrees: Option<f32>,
     lens_radius: f32,
 }
 
@@ -192,7 +194,14 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
         camera: CameraInfo {
             position: (to_world.w_axis.truncate().as_dvec3() + scene.origin).into(),
             direction: to_world.z_axis.truncate().normalize_or_zero().into(),
-            fov_degrees: scene.camera.fov,
+            projection: match scene.camera.projection {
+                Projection::Perspective => "perspective",
+                Projection::Orthographic => "orthographic",
+                Projection::Spherical => "spherical",
+                Projection::EqualArea => "equalarea",
+            },
+            fov_degrees: (scene.camera.projection == Projection::Perspective)
+                .then_some(scene.camera.fov),
             lens_radius: scene.camera.lens_radius,
         },
         film: FilmInfo {
@@ -270,6 +279,15 @@ fn lights(scene: &Scene) -> Lights {
         };
     }
     counts
+}
+
+impl CameraInfo {
+    fn view(&self) -> String {
+        match self.fov_degrees {
+            Some(fov) => format!("field of view {fov} degrees"),
+            None => format!("{} projection", self.projection),
+        }
+    }
 }
 
 impl Materials {
@@ -370,7 +388,7 @@ fn text(document: &Document) -> String {
          bounds       {bounds}\n\
          materials    {}\n\
          lights       {}, {} area with {} primitives\n\
-         camera       at {:?} towards {:?}, field of view {} degrees, lens radius {}\n\
+         camera       at {:?} towards {:?}, {}, lens radius {}\n\
          film         {} x {} pixels, of them x {} to {} and y {} to {}\n\
          integrator   {}, {} samples per pixel of the sampler {}\n\
          times        {:.3} s to load{load}, {:.3} s to lower, {:.3} s to build the binary tree ({})\n\
@@ -389,7 +407,7 @@ fn text(document: &Document) -> String {
         count(lights.area_primitives as u64),
         camera.position,
         camera.direction,
-        camera.fov_degrees,
+        camera.view(),
         camera.lens_radius,
         film.resolution[0],
         film.resolution[1],

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use antumbra_image::{Channel, Notes};
 use antumbra_render::{Layers, Options, Rendering, World};
-use antumbra_scene::Scene;
+use antumbra_scene::{Projection, Scene};
 use glam::{DVec3, Vec3};
 
 use crate::args::{AovNames, RenderArgs};
@@ -109,13 +109,15 @@ fn notes(scene: &Scene, rendering: &Rendering, options: &Options) -> Notes {
         ("program", format!("antumbra {}", env!("CARGO_PKG_VERSION"))),
         ("scene", scene.name.clone()),
         ("camera", look),
-        ("fov", camera.fov.to_string()),
         ("samples per pixel", rendering.stats.spp.to_string()),
         ("sampler", scene.sampler.kind.name().to_owned()),
         ("seed", options.seed.to_string()),
         ("order", options.recipe.order.name().to_owned()),
     ];
     let mut notes = lines.map(|(name, value)| (name.to_owned(), value)).to_vec();
+    if camera.projection == Projection::Perspective {
+        notes.insert(3, ("fov".to_owned(), camera.fov.to_string()));
+    }
     if is_local {
         notes.push(("origin of positions".to_owned(), at(Vec3::ZERO)));
     }

@@ -20,6 +20,8 @@ pub struct PoseArgs {
     #[arg(long, value_name = "LOOKAT", allow_hyphen_values = true)]
     pub camera: Option<LookAt>,
     /// Angle of view over the shorter side, in degrees
+    ///
+    /// Refused for scenes whose camera has no perspective.
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = values::angle_of_view)]
     pub fov: Option<f32>,
     /// Axis of a mesh that points up: x, y, z, -x, -y, -z

@@ -188,8 +188,8 @@ pub enum Command {
     Study(StudyArgs),
     /// Try what goes beyond a static child order
     ///
-    /// Counts and times on held-out rays: a cache of occluders, ways of picking by distance, cost models, and a tree that
-    /// learns while the camera moves. Each is tried on the trees of the paper and on the default trees. Answers must be the
+    /// Counts and times on held-out rays: per-node picks by distance, spatial splits, cost models, and a tree that learns
+    /// while the camera moves. Each is tried on the trees of the paper and on the default trees. Answers must be the
     /// same, bit for bit, or the exit code is 1.
     Probe(ProbeArgs),
     /// Measure rays per second, side by side with Embree

@@ -69,7 +69,7 @@ pub struct RenderArgs {
     /// Albedo, normals, position, depth in the .exr
     ///
     /// Layers Albedo, N (geometric) and Ns (shading normal), P, Z (depth), Variance and SampleCount, beside the colours.
-    /// They are means over the first surfaces of up to 64 samples. Normals and positions are in world coordinates.
+    /// Layers are means over the first surfaces of up to 64 samples. Normals and positions are in world coordinates.
     #[arg(long, conflicts_with = "shard", help_heading = heading::OUTPUT)]
     pub layers: bool,
     /// Names of layers: pbrt or cycles
@@ -77,7 +77,7 @@ pub struct RenderArgs {
     pub aov_names: AovNames,
     /// Scene, camera, samples, seed, order in the .exr
     ///
-    /// They are in the attribute comments, with the version of the program. --layers implies it. Without it, equal
+    /// All of these are in the attribute comments, with the version of the program. --layers implies it. Without it, equal
     /// pictures are equal files.
     #[arg(long, conflicts_with = "shard", help_heading = heading::OUTPUT)]
     pub metadata: bool,

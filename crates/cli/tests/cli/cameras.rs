@@ -51,6 +51,26 @@ fn info_tells_of_the_camera_that_is_asked_for() {
     assert!(run.stderr.contains("--up is for meshes"), "{}", run.stderr);
 }
 
+/// A flag that would have no effect is refused.
+#[test]
+fn only_perspective_cameras_have_an_angle_of_view() {
+    let place = Place::empty();
+    place.write(
+        "flat.pbrt",
+        "Camera \"orthographic\" WorldBegin Shape \"sphere\" WorldEnd",
+    );
+    let info = place.run(&["info", "flat.pbrt", "--json", "-"]).expect(0);
+    let camera = &info.json()["camera"];
+    assert_eq!(camera["projection"], "orthographic");
+    assert!(camera["fov_degrees"].is_null());
+    let refused = place.run(&["info", "flat.pbrt", "--fov", "20"]).expect(2);
+    assert!(
+        refused.stderr.contains("--fov is for perspective"),
+        "{}",
+        refused.stderr
+    );
+}
+
 #[test]
 fn pictures_of_occlusion_take_a_camera() {
     let place = Place::with_room();
