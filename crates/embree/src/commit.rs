@@ -272,7 +272,7 @@ impl Plan {
             Some(isa) => recipe.isa(isa),
             None => recipe,
         };
-        // Clients ask ray by ray, and a single ray visits fewer of these nodes. Batches would be faster with 8 children.
+        // Clients trace ray by ray, and a single ray visits fewer of these nodes. Batches would be faster with 8 children.
         match recipe.isa.level() {
             Level::Avx2 => recipe.width(Width::W16),
             _ => recipe,

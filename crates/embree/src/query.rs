@@ -15,29 +15,16 @@ use crate::scene::{Scene, with};
 use crate::transform;
 use crate::user::{Current, with_current};
 
-/// A ray as the kernel takes it, never before the origin. The far end is closed, and so is the near end if `is_closed` says so.
+/// The near end of a ray, never before the origin.
 #[inline]
-pub fn kernel_ray(ray: &RtcRay, is_closed: bool) -> Ray {
-    let tnear = if ray.tnear < 0.0 { 0.0 } else { ray.tnear };
-    let kernel = Ray {
-        org: ray.org,
-        tnear,
-        dir: ray.dir,
-        tfar: ray.tfar,
-    };
-    let closed = kernel.closed();
-    match is_closed {
-        true => closed,
-        // Rays before the origin do not go in packets of the kernel.
-        false => Ray { tnear, ..closed },
-    }
+fn near_end(ray: &RtcRay) -> f32 {
+    if ray.tnear < 0.0 { 0.0 } else { ray.tnear }
 }
 
 /// A distance inside the interval of a ray, whose closed ends the kernel has widened by one number.
 #[inline]
 fn inside(ray: &RtcRay, t: f32) -> f32 {
-    t.max(if ray.tnear < 0.0 { 0.0 } else { ray.tnear })
-        .min(ray.tfar)
+    t.max(near_end(ray)).min(ray.tfar)
 }
 
 /// How a query must be answered.
@@ -52,10 +39,24 @@ pub enum Way {
 }
 
 impl Committed {
-    /// A ray with the ends that Embree has in this scene.
+    /// A ray with the ends that Embree has in this scene: the far one closed, the near one closed or open.
     #[inline]
     pub fn kernel_ray(&self, ray: &RtcRay) -> Ray {
-        kernel_ray(ray, self.traits.near_is_closed)
+        let open = Ray {
+            org: ray.org,
+            tnear: near_end(ray),
+            dir: ray.dir,
+            tfar: ray.tfar,
+        };
+        let closed = open.closed();
+        match self.traits.near_is_closed {
+            true => closed,
+            // Rays before the origin do not go in packets of the kernel.
+            false => Ray {
+                tnear: open.tnear,
+                ..closed
+            },
+        }
     }
 
     /// How rays with this mask must be traced.

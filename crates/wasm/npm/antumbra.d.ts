@@ -59,8 +59,8 @@ export interface BuildOptions {
     quality?: "default" | "fast";
     /**
      * Point that is subtracted from positions and rays before they are rounded to single precision. `"auto"`, the default, is
-     * the middle of positions that are far from zero for their extent, as maps are, and zero for others. It is zero as well
-     * if all positions are `Float32Array`s, which are rounded already.
+     * the middle of positions that are far from zero for their extent, as maps are. The point is zero for other positions, and
+     * for `Float32Array`s, which are rounded already.
      */
     origin?: "auto" | Numbers;
 }
@@ -97,7 +97,8 @@ export interface Antumbra {
      * Builds a scene over meshes, which are copied.
      *
      * Throws a `TypeError` for what is no list of numbers and for unknown fields, and a `RangeError` for lengths that do not
-     * fit, for a triangle that names a vertex that is not there, and if the memory is full.
+     * fit, for a triangle that names a vertex that is not there, and if the memory is full. Any other `Error` ends the module:
+     * load another one.
      */
     build(meshes: Mesh | readonly Mesh[], options?: BuildOptions): Scene;
 }

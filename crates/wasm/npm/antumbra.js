@@ -35,12 +35,13 @@ async function bytesOf(response) {
 }
 
 class Antumbra {
-    #exports;
+    #module;
     #freed;
 
     constructor(exports) {
-        this.#exports = exports;
-        this.#freed = new FinalizationRegistry((scene) => exports.free_scene(scene));
+        const module = new Calls(exports);
+        this.#module = module;
+        this.#freed = new FinalizationRegistry((scene) => module.free(scene));
     }
 
     build(meshes, options = {}) {
@@ -51,7 +52,7 @@ class Antumbra {
         }
         const checked = list.map(checkedMesh);
         const place = originOf(origin, checked);
-        const module = new Calls(this.#exports);
+        const module = this.#module;
         module.call("drop_meshes");
         for (const { positions, indices, name } of checked) {
             const floats = module.memory(Float32Array, "positions", positions.length);
@@ -81,24 +82,30 @@ class Antumbra {
 /** Calls into the module. After a failure inside, the module is of no use any more. */
 class Calls {
     #exports;
+    #failed = null;
 
     constructor(exports) {
         this.#exports = exports;
     }
 
     call(name, ...values) {
+        if (this.#failed !== null) throw new Error(this.#failed);
         let answer;
         try {
             answer = this.#exports[name](...values);
         } catch (failure) {
             if (!(failure instanceof WebAssembly.RuntimeError)) throw failure;
             const text = this.#text("panic_text");
-            throw new Error(text ? `a mistake of antumbra, please report it: ${text}` : `${FULL}; load the module again`, {
-                cause: failure,
-            });
+            this.#failed = text ? `a mistake of antumbra, please report it: ${text}` : `${FULL}; load the module again`;
+            throw new Error(this.#failed, { cause: failure });
         }
         // Addresses are unsigned.
         return Number.isInteger(answer) ? answer >>> 0 : answer;
+    }
+
+    /** Frees a scene. After a failure inside there is nothing to free. */
+    free(scene) {
+        if (this.#failed === null) this.call("free_scene", scene);
     }
 
     view(type, address, length) {
@@ -187,7 +194,7 @@ class Scene {
 
     free() {
         if (this.#number === null) return;
-        this.#module.call("free_scene", this.#number);
+        this.#module.free(this.#number);
         this.#freed.unregister(this);
         this.#number = null;
     }

@@ -22,10 +22,10 @@ pub type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 /// What the module holds between calls of the script.
 #[derive(Default)]
 pub struct Module {
-    /// Coordinates of the next mesh, 3 per vertex.
-    pub positions: Vec<f32>,
-    /// Vertices of the triangles of the next mesh, 3 per triangle.
-    pub indices: Vec<u32>,
+    /// Vertices of the next mesh.
+    pub positions: Vec<[f32; 3]>,
+    /// Vertices of the triangles of the next mesh.
+    pub indices: Vec<[u32; 3]>,
     /// Rays of the next call.
     pub rays: Vec<Ray>,
     /// Answers of the last [`Module::occluded`], 0 or 1 per ray.
@@ -52,11 +52,9 @@ pub fn reserve<T: Clone>(list: &mut Vec<T>, count: usize, item: T) -> Option<()>
 impl Module {
     /// Keeps the mesh in `positions` and `indices` for the next [`Module::build`].
     pub fn add_mesh(&mut self) {
-        let (positions, _) = self.positions.as_chunks();
-        let (indices, _) = self.indices.as_chunks();
-        self.meshes.push((positions.to_vec(), indices.to_vec()));
-        self.positions = Vec::new();
-        self.indices = Vec::new();
+        let positions = std::mem::take(&mut self.positions);
+        let indices = std::mem::take(&mut self.indices);
+        self.meshes.push((positions, indices));
     }
 
     /// Forgets the meshes that were added, after a mistake of the caller.
@@ -70,12 +68,13 @@ impl Module {
     /// The text of the kernel's error: a triangle that names a vertex that is not there, too many primitives.
     pub fn build(&mut self, preset: Preset) -> Result<usize, String> {
         let meshes = std::mem::take(&mut self.meshes);
+        let rays = std::mem::take(&mut self.rays);
         let geometries: Vec<_> = meshes
             .iter()
             .map(|(positions, indices)| Geometry::triangles(&positions[..], &indices[..]))
             .collect();
-        let bvh = Bvh::learn(&geometries, &self.rays, &preset.recipe())
-            .map_err(|error| error.to_string())?;
+        let bvh =
+            Bvh::learn(&geometries, &rays, &preset.recipe()).map_err(|error| error.to_string())?;
         let free = self.scenes.iter().position(Option::is_none);
         let number = free.unwrap_or(self.scenes.len());
         if free.is_none() {

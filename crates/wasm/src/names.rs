@@ -45,16 +45,16 @@ pub extern "C" fn begin() {
     }));
 }
 
-/// Address of `count` coordinates of the next mesh.
+/// Address of `count` coordinates of the next mesh, 3 per vertex.
 #[cfg_attr(target_family = "wasm", unsafe(no_mangle))]
 pub extern "C" fn positions(count: usize) -> usize {
-    room(|module| &mut module.positions, count, 0.0)
+    room(|module| &mut module.positions, count / 3, [0.0; 3])
 }
 
-/// Address of `count` indices of the next mesh.
+/// Address of `count` indices of the next mesh, 3 per triangle.
 #[cfg_attr(target_family = "wasm", unsafe(no_mangle))]
 pub extern "C" fn indices(count: usize) -> usize {
-    room(|module| &mut module.indices, count, 0)
+    room(|module| &mut module.indices, count / 3, [0; 3])
 }
 
 /// Address of `count` rays, 8 numbers each: origin, near end, direction, far end.
@@ -147,7 +147,7 @@ pub extern "C" fn report(scene: usize, figure: u32) -> f64 {
     .unwrap_or(f64::NAN)
 }
 
-/// Address of the text of the last error, or of its length in bytes if `of_length` is 1.
+/// Address of the text of the last error, or the length of the text in bytes if `of_length` is 1.
 #[cfg_attr(target_family = "wasm", unsafe(no_mangle))]
 pub extern "C" fn error(of_length: u32) -> usize {
     with(|module| text(&module.error, of_length))

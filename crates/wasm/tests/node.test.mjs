@@ -147,6 +147,23 @@ test("mistakes say what was found and what is wanted", () => {
     assert.equal(antumbra.build(square).report.triangles, 2);
 });
 
+test("a module that has failed says so, and its scenes are freed without errors", async () => {
+    const module = await WebAssembly.compile(await readFile(new URL("antumbra.wasm", folder)));
+    const { instantiate } = WebAssembly;
+    const fail = () => { throw new WebAssembly.RuntimeError("unreachable"); };
+    WebAssembly.instantiate = async (...source) => {
+        const { exports } = await instantiate(...source);
+        return { exports: { ...exports, occluded: fail, free_scene: fail } };
+    };
+    const failing = await load(module).finally(() => { WebAssembly.instantiate = instantiate; });
+    const scene = failing.build(square);
+    const ray = { origins: [1, 1, 0], directions: [0, 0, 1] };
+    assert.throws(() => scene.occluded(ray), /full; load the module again/);
+    assert.throws(() => scene.intersect(ray), /full; load the module again/);
+    assert.throws(() => failing.build(square), /full; load the module again/);
+    scene.free();
+});
+
 test("triangles that cannot be hit are counted", () => {
     const { report } = antumbra.build({ positions: [...square.positions, NaN, 0, 0], indices: [0, 1, 2, 0, 0, 2, 0, 1, 4] });
     assert.deepEqual([report.triangles, report.dropped], [1, 2]);

@@ -48,9 +48,13 @@ fn digest(bytes: impl Iterator<Item = u8>) -> u64 {
 #[test]
 fn the_module_and_the_library_answer_with_the_same_bits() {
     let (positions, rays) = scene();
+    let (points, _) = positions.as_chunks::<3>();
+    let indices: Vec<_> = (0..TRIANGLES as u32)
+        .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
+        .collect();
     let mut module = Module {
-        indices: (0..3 * TRIANGLES as u32).collect(),
-        positions: positions.clone(),
+        indices: indices.clone(),
+        positions: points.to_vec(),
         rays: rays.clone(),
         ..Module::default()
     };
@@ -60,10 +64,6 @@ fn the_module_and_the_library_answer_with_the_same_bits() {
     module.occluded(number).unwrap();
     module.intersect(number).unwrap();
 
-    let (points, _) = positions.as_chunks::<3>();
-    let indices: Vec<_> = (0..TRIANGLES as u32)
-        .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
-        .collect();
     let bvh = Bvh::build(&[Geometry::triangles(points, indices)], &Recipe::default()).unwrap();
     let hits = bvh.batch(&rays).intersect();
     let hit: Vec<_> = hits.iter().map(|hit| u8::from(hit.is_some())).collect();
@@ -110,8 +110,8 @@ fn scenes_are_freed_and_their_numbers_are_used_again() {
 #[test]
 fn a_mistake_says_what_is_wrong_and_leaves_nothing() {
     let mut module = Module {
-        positions: vec![0.0; 9],
-        indices: vec![0, 1, 3],
+        positions: vec![[0.0; 3]; 3],
+        indices: vec![[0, 1, 3]],
         ..Module::default()
     };
     module.add_mesh();

@@ -21,4 +21,4 @@ scene.occluded({ origins: [0, 0, 0], directions: [0, 0, 1], tfar: 1 });
 // @ts-expect-error: numbers, not texts
 antumbra.build({ positions: ["0"] });
 // @ts-expect-error: the origin is not written
-scene.origin = numbers;
+scene.origin = [0, 0, 0];

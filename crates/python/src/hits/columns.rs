@@ -74,7 +74,7 @@ impl Columns {
 }
 
 impl Rows<'_> {
-    /// Writes hits of as many rays; what is missed stays as it is.
+    /// Writes hits of as many rays. Rows of rays that hit nothing stay as they are.
     pub fn fill(self, scene: &SceneData, hits: &[Option<Hit>]) {
         for (row, hit) in hits.iter().enumerate() {
             if let Some(hit) = hit {
@@ -102,7 +102,7 @@ impl Rows<'_> {
         }
     }
 
-    /// As many rows each as given, the last ones perhaps fewer.
+    /// Chunks of `len` rows, the last one perhaps shorter.
     pub fn chunks(self, len: usize) -> Vec<Self> {
         let columns = self.t.chunks_mut(len).zip(self.triangle.chunks_mut(len));
         let columns = columns

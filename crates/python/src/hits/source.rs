@@ -9,7 +9,7 @@ use crate::geometry::{Ids, Part, Parts};
 use crate::memory;
 use crate::scene::SceneData;
 
-/// What knows where a hit lies.
+/// Data from which points and normals of hits are computed.
 #[derive(Clone)]
 pub struct Source {
     pub(super) parts: Arc<Parts>,
@@ -37,7 +37,7 @@ impl Source {
         })
     }
 
-    /// What knows where some of the hits lie.
+    /// The data of some of the hits.
     pub(super) fn of(&self, places: &[usize]) -> PyResult<Self> {
         let rays = match self.rays.is_empty() {
             true => Vec::new(),
