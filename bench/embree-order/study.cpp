@@ -2,7 +2,7 @@
 //
 //   embree-order FOLDER SCENE SEED ROUNDS      rows as CSV; the first line of the output names the columns
 //
-// FOLDER has the files of `cargo run --example occlusion_rays`. For every kind of rays, orders are learned from the training
+// FOLDER has the files that rays.py writes. For every kind of rays, orders are learned from the training
 // rays and timed on the held-out rays. Answers in every order must be those of Embree's own, or the program fails.
 //
 // Embree visits hit children of an occlusion query from the highest slot to the lowest, and sorts nothing
@@ -51,7 +51,7 @@ double seconds() {
 }
 
 // A child as Embree built it.
-struct Child { Ref ref; BBox3fa box; size_t prims; };
+struct Child { Ref ref; BBox3fa box; };
 
 // A node with its children as Embree has them, in the sequence of visits: the last slot first.
 struct Place { Node* node; std::vector<Child> children; std::vector<int> below; };
@@ -63,7 +63,7 @@ public:
     std::vector<Place> places;
     size_t triangles = 0;
 
-    explicit Tree(Ref root) : root(root) { add(root); }
+    explicit Tree(Ref root) { add(root); }
 
     // Puts the children of all nodes into an order of visits.
     void permute(const Order& order) {
@@ -154,8 +154,6 @@ public:
     }
 
 private:
-    Ref root;
-
     int add(Ref ref) {
         if (!ref.isAABBNode()) {
             size_t num;
@@ -169,7 +167,7 @@ private:
         size_t used = 0;
         while (used < 8 && node->child(used) != BVH8::emptyNode) used++;
         for (size_t slot = used; slot-- > 0;)
-            places[index].children.push_back({node->child(slot), node->bounds(slot), 0});
+            places[index].children.push_back({node->child(slot), node->bounds(slot)});
         for (size_t k = 0; k < used; k++) {
             int child = add(places[index].children[k].ref);
             places[index].below.push_back(child);

@@ -10,6 +10,7 @@ use alloc::vec::Vec;
 use crate::aabb::Aabb;
 use crate::builder::binned_sah;
 use crate::geometry::primitives::Primitives;
+use crate::lab::candidates::center;
 use crate::lab::pieces::Piece;
 use crate::parallel;
 use crate::tree::binary::BinaryTree;
@@ -71,7 +72,7 @@ impl Item {
     fn new(primitives: &Primitives, index: usize) -> Self {
         let bounds = primitives.bounds_of(index);
         Self {
-            center: core::array::from_fn(|axis| 0.5 * bounds.min[axis] + 0.5 * bounds.max[axis]),
+            center: core::array::from_fn(|axis| center(&bounds, axis)),
             bounds,
             index: index as u32,
         }

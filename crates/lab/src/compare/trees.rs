@@ -48,7 +48,7 @@ pub struct Ready {
     pub learns: bool,
 }
 
-/// What decides a first tree: builder, collapse, width, and the bits of what a primitive test costs.
+/// Choices that decide a first tree: builder, collapse, width, and the bits of what a primitive test costs.
 type Shape = (Builder, Collapse, Width, u32);
 
 fn shape(builder: Builder, recipe: &Recipe) -> Shape {

@@ -146,8 +146,9 @@ pub fn plain_line(name: String, values: &[Option<f64>], decimals: usize) -> Line
 /// A line in which the best figure is marked, with all that are printed alike or whose spread overlaps its own. Nothing is
 /// marked unless the best one beats another beyond their spread.
 pub fn marked_line(name: String, values: &[Option<Measured>], decimals: usize, most: bool) -> Line {
-    let better = |a: Measured, b: Measured| match (b.value > a.value) == most {
-        true if b.value != a.value => b,
+    let better = |a: Measured, b: Measured| match most {
+        true if b.value > a.value => b,
+        false if b.value < a.value => b,
         _ => a,
     };
     let text = |value: Option<f64>| number(value, decimals);
@@ -182,7 +183,7 @@ mod tests {
             [false, true, false]
         );
         assert_eq!(marks(&[exact(2.0), exact(1.0)], 2, true), [true, false]);
-        // What is printed alike is equally good, and nothing is best of equals.
+        // Figures that are printed alike are equally good, and nothing is best of equals.
         let three = [exact(1.001), exact(1.002), exact(3.0)];
         assert_eq!(marks(&three, 2, false), [true, true, false]);
         assert_eq!(

@@ -27,24 +27,14 @@ use crate::study::{By, Kind, Part, Plan, Results, Row};
 use crate::table::{Table, count, number};
 use crate::{Error, Machine};
 
-const HEADER: [&str; 17] = [
-    "order",
-    "C_p",
+/// Columns of N_b and N_t, before and after sorting.
+const TESTS: [&str; 6] = [
     "N_b before",
     "N_b after",
     "N_b gain",
     "N_t before",
     "N_t after",
     "N_t gain",
-    "N_b unsorted",
-    "N_t unsorted",
-    "log s",
-    "sort ms",
-    "shadow s",
-    "composed s",
-    "spread",
-    "vs simple",
-    "top N_b after",
 ];
 
 const BEST: [&str; 9] = [
@@ -178,37 +168,36 @@ fn of_orders(rows: &[&Row]) -> Option<Table> {
         count(first.shadow_rays.unwrap_or(0)),
         100.0 * first.shadow_share.unwrap_or(0.0),
     );
-    let columns = match first.top_node_tests_after {
-        Some(_) => HEADER.len(),
-        None => HEADER.len() - 1,
-    };
+    let times = [
+        "N_b unsorted",
+        "N_t unsorted",
+        "log s",
+        "sort ms",
+        "shadow s",
+        "composed s",
+        "spread",
+        "vs simple",
+        "top N_b after",
+    ];
+    let mut header = [&["order", "C_p"][..], &TESTS, &times].concat();
+    if first.top_node_tests_after.is_none() {
+        header.pop();
+    }
     Some(Table {
         caption,
-        header: HEADER[..columns].to_vec(),
         rows: (rows.iter())
             .map(|row| {
                 let mut cells = line(row, reference.copied());
-                cells.truncate(columns);
+                cells.truncate(header.len());
                 cells
             })
             .collect(),
+        header,
     })
 }
 
-/// The same scene in the paper, or the one that ours replaces.
+/// Figures of the paper for the scene, or for the scene that ours replaces.
 fn of_the_paper(rows: &[&Row]) -> Option<Table> {
-    const PAPER: [&str; 10] = [
-        "order",
-        "N_b before",
-        "N_b after",
-        "N_b gain",
-        "N_t before",
-        "N_t after",
-        "N_t gain",
-        "log s",
-        "sort ms",
-        "rendering s",
-    ];
     let first = rows.first()?;
     let theirs = paper::counterpart(&first.scene)?;
     let lines = paper::lines(&first.scene, first.width);
@@ -236,7 +225,7 @@ fn of_the_paper(rows: &[&Row]) -> Option<Table> {
     };
     Some(Table {
         caption: format!("{relation}, width {}", first.width),
-        header: PAPER.to_vec(),
+        header: [&["order"][..], &TESTS, &["log s", "sort ms", "rendering s"]].concat(),
         rows: lines.iter().map(cells).collect(),
     })
 }
@@ -344,9 +333,7 @@ fn of_best(plan: &Plan, mut rows: Vec<&Row>) -> Table {
             row.collapse.clone(),
             format!("{} {}", row.order, row.width),
             number(row.speed, 2),
-            row.speed_range.map_or_else(String::new, |[least, most]| {
-                format!("{least:.2} to {most:.2}")
-            }),
+            replays::range(row.speed_range),
             number(cost(row), 3),
             number(row.node_tests_after, 3),
             number(row.prim_tests_after, 3),

@@ -6,6 +6,7 @@ use antumbra::recipe::Order;
 use serde::Serialize;
 
 use super::blocks::{Block, Cell, Line, Measured, marked_line, plain_line};
+use super::learned;
 use super::paper::{self, Figures};
 use super::pictures::{Comparison, Embedded, Maps};
 use crate::Error;
@@ -147,7 +148,6 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
         .copied()
         .collect();
     let first = own.first()?;
-    let learned = |row: &Row, value: f64| (row.log_rays > 0).then_some(value);
     let plain_of = |name: &str, decimals, value: &dyn Fn(&Row) -> Option<f64>| {
         let values: Vec<Option<f64>> = own.iter().map(|row| value(row)).collect();
         plain_line(name.to_owned(), &values, decimals)

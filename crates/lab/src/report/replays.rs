@@ -95,7 +95,7 @@ pub fn best(plan: &Plan, rows: &[&Row], kind: Kind) -> Block {
 }
 
 /// Least and most in words.
-fn range(range: Option<[f64; 2]>) -> String {
+pub fn range(range: Option<[f64; 2]>) -> String {
     range.map_or_else(
         || "-".to_owned(),
         |[least, most]| format!("{least:.2} to {most:.2}"),

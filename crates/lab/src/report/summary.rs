@@ -297,8 +297,8 @@ impl Summary {
         if whole { lines } else { Vec::new() }
     }
 
-    /// What a reader should use: by measured rate where rates were measured in several rounds, by cost otherwise, and
-    /// which of both.
+    /// Advice to a reader: by measured rate where rates were measured in several rounds, by cost otherwise, and which of
+    /// both.
     pub fn advice(&self) -> Option<String> {
         let kind = Kind::ALL
             .into_iter()
@@ -391,8 +391,8 @@ impl Summary {
         })
     }
 
-    /// What learning an order gains over the best static order that needs no rays, on trees that learned nothing: in
-    /// cost, as geometric mean of the scenes. `None` unless both were measured.
+    /// Gain of learning an order over the best static order that needs no rays, on trees that learned nothing: in cost,
+    /// as geometric mean of the scenes. `None` unless both were measured.
     pub fn over_free_orders(&self) -> Option<String> {
         let kind = Kind::ALL
             .into_iter()
@@ -633,7 +633,7 @@ mod tests {
         assert!(found.contains("No rates were measured"), "{found}");
     }
 
-    /// What learning gains is compared with the best of the free orders, not against the arbitrary one.
+    /// The gain of learning is relative to the best of the free orders, not to the arbitrary one.
     #[test]
     fn learning_is_compared_with_the_best_order_without_rays() {
         let plan = plan(1);
