@@ -19,7 +19,7 @@ pub struct Hits {
 /// Positions and indices of triangles.
 pub type Mesh = (Vec<[f32; 3]>, Vec<[u32; 3]>);
 
-/// What the module holds between calls of the script.
+/// Meshes and trees that the module holds between calls of the script.
 #[derive(Default)]
 pub struct Module {
     /// Vertices of the next mesh.
