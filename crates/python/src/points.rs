@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 
 use crate::arrays::{Numbers, shape_text, wrong_shape};
 use crate::broadcast::{Index, Operand, common_shape};
-use crate::hits::{Columns, Hits, Source, State};
+use crate::hits::{Columns, Hits, Row, Source, State};
 use crate::memory;
 use crate::rays::Call;
 use crate::scene::SceneData;
@@ -184,7 +184,8 @@ pub fn closest<'py>(
         Ok(())
     })?;
     let mut columns = Columns::missed(points.len())?;
-    columns.rows(0..points.len()).fill_near(scene, &found);
+    let rows = columns.rows(0..points.len());
+    rows.fill(&found, |near| Row::of_point(scene, near));
     let local = scene.local();
     let places = found.iter().flat_map(|near| match near {
         Some(near) => local.world(near.position),

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 
 use crate::geometry::Ids;
-use crate::hits::Columns;
+use crate::hits::{Columns, Row};
 use crate::memory;
 use crate::rays::{Call, Gathering, PIECE, Piece, RaySource};
 use crate::scene::SceneData;
@@ -34,14 +34,15 @@ pub fn first_hits<R: RaySource>(
             range,
             threads,
         };
+        let row = |hit: &Hit| Row::of_hit(scene, hit);
         py.detach(|| {
             memory::refill(&mut hits, None, piece.range.len(), "hits")?;
             piece.ask(&mut gathered, Gathering::All, &mut hits, &query)?;
             if piece.is_alone() {
-                rows.fill(scene, &hits);
+                rows.fill(&hits, row);
             } else {
                 let rows = rows.chunks(ROWS).into_par_iter().zip(hits.par_chunks(ROWS));
-                piece.run(|| rows.for_each(|(rows, hits)| rows.fill(scene, hits)));
+                piece.run(|| rows.for_each(|(rows, hits)| rows.fill(hits, row)));
             }
             Ok(())
         })
@@ -209,17 +210,22 @@ pub fn all_hits<R: RaySource>(
                 false => batch.all_hits(),
             });
             let kept = |ray| found.of(ray).len().min(most);
-            lists.columns.grow((0..found.len()).map(kept).sum())?;
+            let mut place = 0;
+            let first = lists.columns.t.len();
+            let mut rows = lists.columns.grow((0..found.len()).map(kept).sum())?;
             for ray in 0..found.len() {
                 let hits = match distinct {
                     true => unique.of(&some[ray], found.of(ray)),
                     false => found.of(ray),
                 };
                 for hit in &hits[..hits.len().min(most)] {
-                    lists.columns.push(scene, hit);
+                    rows.set(place, Row::of_hit(scene, hit));
+                    place += 1;
                 }
-                lists.splits.push(lists.columns.t.len() as i64);
+                lists.splits.push((first + place) as i64);
             }
+            // Hits that were not distinct leave rows over.
+            lists.columns.truncate(first + place);
             Ok(())
         })
     })?;

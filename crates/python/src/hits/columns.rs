@@ -19,6 +19,14 @@ pub struct Columns {
     pub uv: Vec<f32>,
 }
 
+/// What columns have of one hit, or of one nearest point.
+#[derive(Clone, Copy)]
+pub struct Row {
+    t: f32,
+    ids: Ids,
+    uv: [f32; 2],
+}
+
 /// Names of what columns hold, where there is no memory for it.
 const HITS: &str = "hits";
 const WEIGHTS: &str = "weights of hits";
@@ -35,22 +43,35 @@ pub struct Rows<'a> {
 impl Columns {
     /// Rows of rays that hit nothing.
     pub fn missed(len: usize) -> PyResult<Self> {
-        Ok(Self {
-            t: memory::filled(f32::INFINITY, len, HITS)?,
-            triangle: memory::filled(-1, len, HITS)?,
-            mesh: memory::filled(-1, len, HITS)?,
-            instance: memory::filled(-1, len, HITS)?,
-            uv: memory::filled(0.0, 2 * len, WEIGHTS)?,
-        })
+        let mut columns = Self::default();
+        columns.grow(len)?;
+        Ok(columns)
     }
 
-    /// Makes room for more rows.
-    pub fn grow(&mut self, more: usize) -> PyResult<()> {
+    /// Appends rows of rays that hit nothing.
+    pub fn grow(&mut self, more: usize) -> PyResult<Rows<'_>> {
+        let first = self.t.len();
+        let len = first + more;
         memory::grow(&mut self.t, more, HITS)?;
         memory::grow(&mut self.triangle, more, HITS)?;
         memory::grow(&mut self.mesh, more, HITS)?;
         memory::grow(&mut self.instance, more, HITS)?;
-        memory::grow(&mut self.uv, 2 * more, WEIGHTS)
+        memory::grow(&mut self.uv, 2 * more, WEIGHTS)?;
+        self.t.resize(len, f32::INFINITY);
+        self.triangle.resize(len, -1);
+        self.mesh.resize(len, -1);
+        self.instance.resize(len, -1);
+        self.uv.resize(2 * len, 0.0);
+        Ok(self.rows(first..len))
+    }
+
+    /// Drops all rows but the first so many.
+    pub fn truncate(&mut self, len: usize) {
+        self.t.truncate(len);
+        self.triangle.truncate(len);
+        self.mesh.truncate(len);
+        self.instance.truncate(len);
+        self.uv.truncate(2 * len);
     }
 
     pub fn rows(&mut self, range: Range<usize>) -> Rows<'_> {
@@ -62,42 +83,41 @@ impl Columns {
             uv: &mut self.uv.as_chunks_mut().0[range],
         }
     }
+}
 
-    pub fn push(&mut self, scene: &SceneData, hit: &Hit) {
-        let ids = Ids::of_hit(scene, hit);
-        self.t.push(hit.t);
-        self.triangle.push(ids.triangle);
-        self.mesh.push(ids.mesh);
-        self.instance.push(ids.instance);
-        self.uv.extend([hit.u, hit.v]);
+impl Row {
+    pub fn of_hit(scene: &SceneData, hit: &Hit) -> Self {
+        Self {
+            t: hit.t,
+            ids: Ids::of_hit(scene, hit),
+            uv: [hit.u, hit.v],
+        }
+    }
+
+    pub fn of_point(scene: &SceneData, near: &ClosestPoint) -> Self {
+        Self {
+            t: near.distance,
+            ids: Ids::of_point(scene, near),
+            uv: [near.u, near.v],
+        }
     }
 }
 
 impl Rows<'_> {
-    /// Writes hits of as many rays. Rows of rays that hit nothing stay as they are.
-    pub fn fill(self, scene: &SceneData, hits: &[Option<Hit>]) {
-        for (row, hit) in hits.iter().enumerate() {
-            if let Some(hit) = hit {
-                let ids = Ids::of_hit(scene, hit);
-                self.t[row] = hit.t;
-                self.triangle[row] = ids.triangle;
-                self.mesh[row] = ids.mesh;
-                self.instance[row] = ids.instance;
-                self.uv[row] = [hit.u, hit.v];
-            }
-        }
+    #[inline(always)]
+    pub fn set(&mut self, place: usize, row: Row) {
+        self.t[place] = row.t;
+        self.triangle[place] = row.ids.triangle;
+        self.mesh[place] = row.ids.mesh;
+        self.instance[place] = row.ids.instance;
+        self.uv[place] = row.uv;
     }
 
-    /// Writes nearest points of as many points.
-    pub fn fill_near(self, scene: &SceneData, found: &[Option<ClosestPoint>]) {
-        for (row, near) in found.iter().enumerate() {
-            if let Some(near) = near {
-                let ids = Ids::of_point(scene, near);
-                self.t[row] = near.distance;
-                self.triangle[row] = ids.triangle;
-                self.mesh[row] = ids.mesh;
-                self.instance[row] = ids.instance;
-                self.uv[row] = [near.u, near.v];
+    /// Writes what was found for as many rays or points. Rows without anything stay as they are.
+    pub fn fill<T>(mut self, found: &[Option<T>], row: impl Fn(&T) -> Row) {
+        for (place, found) in found.iter().enumerate() {
+            if let Some(found) = found {
+                self.set(place, row(found));
             }
         }
     }

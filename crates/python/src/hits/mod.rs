@@ -14,7 +14,7 @@ use pyo3::sync::PyOnceLock;
 use pyo3::types::{PyDict, PySlice};
 use rayon::prelude::*;
 
-pub use columns::Columns;
+pub use columns::{Columns, Row};
 pub use list::HitList;
 use source::Meshes;
 pub use source::Source;
