@@ -13,8 +13,11 @@ const BITS: u32 = 21;
 const SHORT: f64 = 3.0;
 
 /// Places of points along the curve: the point at place `i` is `order[i]`. Points stay as given if the way through them is already
-/// about as short as a way through as many points of a square.
-pub(crate) fn along_curve(points: &[[f32; 3]]) -> Result<Vec<u32>, Error> {
+/// about as short as a way through as many points of a square. Points that are not finite come anywhere.
+///
+/// # Errors
+/// [`Error::NoMemory`].
+pub fn along_curve(points: &[[f32; 3]]) -> Result<Vec<u32>, Error> {
     let finite = |point: &&[f32; 3]| point.iter().all(|x| x.is_finite());
     let bounds = points
         .iter()

@@ -134,6 +134,7 @@ pub use bits::{BitMatrix, ones};
 pub use clock::Clock;
 pub use creases::{CREASE_ANGLE, Creased, inside_edges, split_at_creases};
 pub use curvature::{Curvature, EARTH_RADIUS, REFRACTION};
+pub use curve::along_curve;
 pub use directions::Weighting;
 pub use epw::{BadWeather, Record, Weather};
 pub use error::Error;

@@ -7,7 +7,7 @@ use numpy::{
 };
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyTuple};
+use pyo3::types::{PyDict, PySlice, PyTuple};
 
 use crate::memory;
 
@@ -16,8 +16,8 @@ pub struct Numbers<'py> {
     name: &'static str,
     memory: Memory<'py>,
     shape: Vec<usize>,
-    /// Whether memory holds one item alone, which stands for all: the array was broadcast by the caller.
-    is_repeated: bool,
+    /// Shape of the items in memory: 1 along axes along which the caller broadcast the array.
+    held: Vec<usize>,
 }
 
 enum Memory<'py> {
@@ -48,20 +48,23 @@ impl<'py> Numbers<'py> {
         }
         let lead = shape.len() - item_axes;
         let strides = array.strides();
-        let is_repeated = lead > 0
-            && !array.is_empty()
-            && (0..lead).all(|axis| strides[axis] == 0 || shape[axis] == 1);
-        let array = if is_repeated {
-            let first = PyTuple::new(object.py(), vec![0; lead])?;
-            as_array(&array.get_item(first)?, name)?
+        let is_repeated = |axis: usize| strides[axis] == 0 && shape[axis] > 1;
+        let py = object.py();
+        let array = if !array.is_empty() && (0..lead).any(is_repeated) {
+            let first = |axis| match is_repeated(axis) {
+                true => PySlice::new(py, 0, 1, 1),
+                false => PySlice::full(py),
+            };
+            let held = PyTuple::new(py, (0..lead).map(first))?;
+            as_array(&array.get_item(held)?, name)?
         } else {
             array
         };
         Ok(Self {
             name,
+            held: array.shape()[..lead.min(array.shape().len())].to_vec(),
             memory: Memory::of(array, name)?,
             shape,
-            is_repeated,
         })
     }
 
@@ -101,8 +104,9 @@ impl<'py> Numbers<'py> {
         self.name
     }
 
-    pub fn is_repeated(&self) -> bool {
-        self.is_repeated
+    /// Shape of the items in memory, without the axis of the item: 1 along axes on which all items are one.
+    pub fn held(&self) -> &[usize] {
+        &self.held
     }
 
     /// Rows of an array of shape (n, 3).

@@ -50,6 +50,14 @@ impl Index {
         }
     }
 
+    /// The axes, if there are two.
+    pub fn pair(&self) -> Option<[(usize, usize); 2]> {
+        match self {
+            Self::Strided(axes) => axes[..].try_into().ok(),
+            _ => None,
+        }
+    }
+
     #[inline(always)]
     pub fn at(&self, place: usize) -> usize {
         match self {
@@ -79,14 +87,9 @@ pub struct Operand<'a> {
 
 impl<'a> Operand<'a> {
     pub fn new(numbers: &'a Numbers<'_>, item: usize, out: &[usize]) -> Self {
-        let index = if numbers.is_repeated() {
-            Index::One
-        } else {
-            Index::new(numbers.lead(item), out)
-        };
         Self {
             values: numbers.values(),
-            index,
+            index: Index::new(numbers.held(), out),
             item,
             skipped: 0,
         }
@@ -109,6 +112,15 @@ impl<'a> Operand<'a> {
         match self.values {
             Values::F32(values) => [0, 1, 2].map(|axis| f64::from(values[first + axis])),
             Values::F64(values) => [0, 1, 2].map(|axis| values[first + axis]),
+        }
+    }
+
+    /// The first four numbers of an item.
+    pub fn row(&self, place: usize) -> [f64; 4] {
+        let first = self.place(place);
+        match self.values {
+            Values::F32(values) => [0, 1, 2, 3].map(|column| f64::from(values[first + column])),
+            Values::F64(values) => [0, 1, 2, 3].map(|column| values[first + column]),
         }
     }
 

@@ -263,19 +263,19 @@ fn placements(instances: &Bound<'_, PyAny>, meshes: usize) -> PyResult<Vec<Place
                 "(4, 4) or (3, 4)",
             ));
         }
-        let number = |place: usize| match matrix.values() {
-            crate::arrays::Values::F32(values) => f64::from(values[place]),
-            crate::arrays::Values::F64(values) => values[place],
-        };
-        if matrix.shape()[0] == 4 && [12, 13, 14, 15].map(number) != [0.0, 0.0, 0.0, 1.0] {
+        let operand = Operand::new(&matrix, 4, matrix.lead(4));
+        let row = |place| operand.row(place);
+        if matrix.shape()[0] == 4 && row(3) != [0.0, 0.0, 0.0, 1.0] {
             return Err(PyValueError::new_err(format!(
                 "transform: the last row of instance {index} is {:?}, wanted [0, 0, 0, 1]",
-                [12, 13, 14, 15].map(number)
+                row(3)
             )));
         }
         memory::grow(&mut placements, 1, "instances")?;
-        let rows = [0, 4, 8].map(|first| [0, 1, 2, 3].map(|column| number(first + column)));
-        placements.push(Placement { mesh, rows });
+        placements.push(Placement {
+            mesh,
+            rows: [0, 1, 2].map(row),
+        });
     }
     Ok(placements)
 }

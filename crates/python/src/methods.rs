@@ -132,9 +132,11 @@ impl Queries {
         )?;
         let mut call = Call::new(threads, progress)?;
         let rays = arguments.rays(&data)?;
+        let group = rays.group(&data)?;
         let query = |batch: Batch<'_>, answers: &mut [bool]| batch.closed().occluded_into(answers);
-        answered(py, out, &arguments.shape, |answers| {
-            call.ask(py, data.bvh(), &rays, answers, query)
+        answered(py, out, &arguments.shape, |answers| match group {
+            Some(group) => group.occluded(py, &data, answers, &mut call),
+            None => call.ask(py, data.bvh(), &rays, answers, query),
         })
     }
 

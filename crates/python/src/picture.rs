@@ -11,7 +11,8 @@ use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::arrays::{Numbers, Values, shaped, wrong_shape};
+use crate::arrays::{Numbers, shaped, wrong_shape};
+use crate::broadcast::Operand;
 use crate::file::{unreadable, warn};
 use crate::memory;
 use crate::rays::Call;
@@ -74,17 +75,11 @@ impl Picture {
                 let wanted = "(height, width, 3) or (height, width)";
                 return Err(wrong_shape("pixels", numbers.shape(), wanted));
             }
-            let count: usize = numbers.shape().iter().product();
-            // One pixel stands for all where the array was broadcast.
-            let values = match numbers.values() {
-                Values::F32(values) => {
-                    memory::collected(values.iter().copied().cycle(), count, PIXELS)
-                }
-                Values::F64(values) => {
-                    let values = values.iter().map(|&value| value as f32);
-                    memory::collected(values.cycle(), count, PIXELS)
-                }
-            }?;
+            let operand = Operand::new(&numbers, 3, numbers.lead(3));
+            let count: usize = numbers.lead(3).iter().product();
+            let pixel = |place| operand.vector(place).map(|x| x as f32);
+            let values = (0..count).flat_map(pixel);
+            let values = memory::collected(values, 3 * count, PIXELS)?;
             shaped(py, values, numbers.shape())?.into_any()
         };
         Ok(Self {
@@ -238,7 +233,7 @@ pub fn heat_map(
     let [height, width] = numbers.shape()[..] else {
         return Err(wrong_shape("values", numbers.shape(), "(height, width)"));
     };
-    let operand = crate::broadcast::Operand::new(&numbers, 1, numbers.shape());
+    let operand = Operand::new(&numbers, 1, numbers.shape());
     let count = height * width;
     let field = (0..count).map(|place| operand.number(place) as f32);
     let field = memory::collected(field, count, PIXELS)?;

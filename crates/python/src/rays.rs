@@ -13,6 +13,7 @@ use rayon::prelude::*;
 
 use crate::arrays::{Numbers, Values};
 use crate::broadcast::{Index, Operand, common_shape};
+use crate::groups::{self, RayGroup};
 use crate::memory;
 use crate::scene::SceneData;
 use crate::threads::{ThreadCount, Threads};
@@ -469,6 +470,51 @@ impl RayArrays<'_> {
     /// Origin and direction of a ray, not rounded.
     pub fn given(&self, place: usize) -> ([f64; 3], [f64; 3]) {
         (self.origins.vector(place), self.directions.vector(place))
+    }
+
+    /// The rays as a group, if they go from every origin in every direction and are many. They have no conditions of their own then,
+    /// and one interval.
+    pub fn group(&self, scene: &SceneData) -> PyResult<Option<RayGroup>> {
+        let ends = [&self.near, &self.far];
+        let is_one = |end: &Option<Operand<'_>>| {
+            (end.as_ref()).is_none_or(|operand| operand.index == Index::One)
+        };
+        let is_plain = matches!(self.masks, Masks::None) && self.excluded.is_empty();
+        if self.len <= FEW || !is_plain || !ends.into_iter().all(is_one) {
+            return Ok(None);
+        }
+        let (Some(of_origins), Some(of_directions)) =
+            (self.origins.index.pair(), self.directions.index.pair())
+        else {
+            return Ok(None);
+        };
+        let (points, directions, is_by_point) = match (of_origins, of_directions) {
+            ([(columns, 0), (rows, 1)], [(_, 1), (_, 0)]) => (rows, columns, true),
+            ([(columns, 1), (rows, 0)], [(_, 0), (_, 1)]) => (columns, rows, false),
+            _ => return Ok(None),
+        };
+        if directions < groups::FEW_DIRECTIONS {
+            return Ok(None);
+        }
+        // Along the axis of columns, items are next to each other in the shape of all.
+        let (of_point, of_direction) = match is_by_point {
+            true => (directions, 1),
+            false => (1, points),
+        };
+        let origin = |point| self.local.local(self.origins.vector(point * of_point));
+        let direction = |place| {
+            self.directions
+                .vector(place * of_direction)
+                .map(|x| x as f32)
+        };
+        let origins = memory::collected((0..points).map(origin), points, "points")?;
+        let all = memory::collected((0..directions).map(direction), directions, "directions")?;
+        let ends = Ray {
+            tnear: self.get(0).tnear,
+            tfar: self.get(0).tfar,
+            ..Ray::default()
+        };
+        Ok(RayGroup::new(scene, (origins, all), ends, is_by_point))
     }
 }
 

@@ -89,6 +89,11 @@ impl SceneData {
         }
     }
 
+    /// Whether all there is are triangles that no instance places.
+    pub fn has_only_world_triangles(&self) -> bool {
+        self.parts.instances.is_empty() && !self.has_spheres
+    }
+
     pub fn world(&self) -> Option<&World> {
         match &self.tree {
             Tree::Fixed(_) => None,

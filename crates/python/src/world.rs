@@ -9,7 +9,7 @@ use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 
-use crate::arrays::{Numbers, Values, shape_text, shaped, wrong_shape};
+use crate::arrays::{Numbers, shape_text, shaped, wrong_shape};
 use crate::bake;
 use crate::broadcast::Operand;
 use crate::geometry::{Part, Parts};
@@ -492,13 +492,7 @@ fn placements(
     // A matrix that stands for all is in memory once.
     let lead = matrices.lead(4);
     let operand = Operand::new(&matrices, 4, lead);
-    let row = |place: usize| {
-        let first = operand.place(place);
-        match matrices.values() {
-            Values::F32(values) => [0, 1, 2, 3].map(|column| f64::from(values[first + column])),
-            Values::F64(values) => [0, 1, 2, 3].map(|column| values[first + column]),
-        }
-    };
+    let row = |place| operand.row(place);
     let mut placements = memory::room(instances, "instances")?;
     for (instance, &object) in named.iter().enumerate() {
         if !(object >= 0.0 && object < count as f64) {

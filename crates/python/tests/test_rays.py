@@ -1,5 +1,7 @@
 """Questions about rays: answers against brute force in numpy."""
 
+import tracemalloc
+
 import antumbra as am
 import numpy as np
 import pytest
@@ -158,3 +160,104 @@ def test_a_learned_scene_has_the_same_answers():
     np.testing.assert_array_equal(plain.intersect(origins, directions).t, learned.intersect(origins, directions).t)
     fast = am.Scene(vertices, faces, quality="fast")
     np.testing.assert_array_equal(plain.occluded(origins, directions), fast.occluded(origins, directions))
+
+
+def one_by_one(scene, origins, directions, **rest):
+    """The same question with an array of all rays."""
+    shape = np.broadcast_shapes(np.shape(origins), np.shape(directions))
+    return scene.occluded(*(np.broadcast_to(rows, shape).copy() for rows in (origins, directions)), **rest)
+
+
+def flat_and_soup():
+    """A plane of triangles, on which points are exactly, and triangles around it."""
+    rng = np.random.default_rng(11)
+    vertices, faces = soup(rng, 300, 0.4)
+    x, y = np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9))
+    corner = np.arange(81).reshape(9, 9)[:-1, :-1].reshape(-1)
+    plane = np.stack([x, y, 0 * x], -1).reshape(-1, 3)
+    cells = np.concatenate([corner[:, None] + [0, 1, 10], corner[:, None] + [0, 10, 9]])
+    return [(plane, cells), (vertices, faces)], vertices, faces
+
+
+def group_of_rays(rng, vertices, faces, points, directions):
+    """Points in free space, on planes, edges and corners, and some that are none; directions of all kinds and lengths."""
+    at = rng.uniform(-1.2, 1.2, (points, 3))
+    at[: points // 4, 2] = 0
+    at[: points // 8] = np.round(at[: points // 8] * 4) / 4
+    corners = vertices[faces[rng.integers(0, len(faces), points // 8)]]
+    at[points // 4 : points // 4 + points // 8] = corners.mean(1)
+    at[points // 2 : points // 2 + points // 8] = corners[:, 0]
+    at[-3:] = [[np.nan, 0, 0], [0, np.inf, 0], [1e30, 0, 0]]
+    to = rng.normal(size=(directions, 3)) * 10 ** rng.uniform(-3, 3, (directions, 1))
+    to[:3] = [[0, 0, 1], [0, -1, 0], [1, 0, 0]]
+    to[3:9] = [[0, 0, 0], [np.nan, 0, 1], [0, np.inf, 1], [1e-30, 0, 2e-30], [1e30, 1e30, 0], [1e-45, 0, 0]]
+    to[9:12, 2] *= 1e-9
+    return at.astype(np.float32), to.astype(np.float32)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("points, directions", [(160, 130), (1200, 20), (40, 700)])
+def test_rays_from_every_point_in_every_direction_are_those_one_by_one(points, directions, threads):
+    meshes, vertices, faces = flat_and_soup()
+    move = np.eye(4)
+    move[:3, 3] = 0.5, -0.25, 0.125
+    scenes = [am.Scene(meshes), am.Scene(meshes, instances=[(1, move)]), am.World(meshes, np.stack([np.eye(4), move]), [0, 1])]
+    o, d = group_of_rays(np.random.default_rng(points), vertices, faces, points, directions)
+    o, d = o[:, None], d[None]
+    ends = [(None, None), (1, None), (0, None), (-1, None), (np.nan, None), (0.75, 0.125), (None, 1e-40), (2, -0.5), (0.5, 1e-3)]
+    found = set()
+    for scene in scenes:
+        for distance, near in ends:
+            expected = one_by_one(scene, o, d, distance=distance, near=near, threads=threads)
+            for p, q in ((o, d), (o.swapaxes(0, 1), d.swapaxes(0, 1))):
+                answers = scene.occluded(p, q, distance, near=near, threads=threads)
+                np.testing.assert_array_equal(answers, expected if p is o else expected.T)
+            found.add(expected.mean())
+    assert len(found) > 10
+    # Where a closed ray begins on a triangle.
+    assert scenes[0].occluded(o, d, 0, threads=threads).any()
+
+
+def test_groups_of_rays_have_any_shape_and_need_no_copies():
+    meshes, vertices, faces = flat_and_soup()
+    o, d = group_of_rays(np.random.default_rng(4), vertices, faces, 180, 120)
+    far = am.Scene([(v + [4e6, 5e6, 0], f) for v, f in meshes])
+    assert far.origin != (0, 0, 0)
+    places = o.astype(float).reshape(12, 15, 1, 3) + [4e6, 5e6, 0]
+    ways = d.astype(float).reshape(8, 15, 3)[:, :, None, None]
+    expected = one_by_one(far, places[..., 0, :], ways)
+    assert expected.shape == (8, 15, 12, 15) and 0.05 < expected.mean() < 0.95
+    np.testing.assert_array_equal(far.occluded(places[..., 0, :], ways), expected)
+    np.testing.assert_array_equal(far.occluded(places, ways[:, :, 0, 0].reshape(120, 3)).reshape(180, 120), expected.reshape(120, 180).T)
+    out = np.zeros(expected.shape, bool)
+    assert far.occluded(places[..., 0, :], ways, out=out) is out
+    np.testing.assert_array_equal(out, expected)
+    # Arrays that numpy has broadcast already.
+    scene = am.Scene(meshes)
+    shape = (180, 120, 3)
+    views = np.broadcast_to(o[:, None], shape), np.broadcast_to(d, shape)
+    out = np.zeros(shape[:2], bool)
+    tracemalloc.start()
+    scene.occluded(*views, out=out)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < out.size
+    np.testing.assert_array_equal(out, scene.occluded(*(view.copy() for view in views)))
+    # Rays with conditions, or an end of their own, are asked about one by one.
+    assert not scene.occluded(*views, mask=0).any()
+    ends = np.linspace(0, 2, 180)[:, None]
+    np.testing.assert_array_equal(scene.occluded(*views, ends), one_by_one(scene, *views, distance=ends))
+
+
+def test_what_numpy_repeats_is_read_once():
+    scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    up = np.broadcast_to(np.float32([0, 0, 1]), (4, 5, 3))
+    at = np.broadcast_to(np.linspace(0, 1, 5)[:, None] * [1, 1, 0], (4, 5, 3))
+    assert scene.occluded(at, up).tolist() == [[True, True, True, False, False]] * 4
+    assert scene.intersect(at, up, np.broadcast_to([[0.5], [1], [2], [3]], (4, 5))).hit.sum(1).tolist() == [0, 3, 3, 3]
+    assert scene.visible(at, np.broadcast_to([0.2, 0.2, 2], (4, 5, 3))).shape == (4, 5)
+    matrix = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (4, 4))
+    with pytest.warns(am.DegenerateWarning):
+        am.Scene([([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])], instances=[(0, matrix)])
+    stripes = np.broadcast_to(np.linspace(0, 1, 4)[:, None, None], (4, 6, 3))
+    assert np.asarray(am.Picture(stripes))[:, 5, 1].tolist() == pytest.approx(np.linspace(0, 1, 4).tolist())
