@@ -72,7 +72,7 @@ mod _core {
     #[pymodule_export]
     use super::threads::{get_threads, set_threads};
     #[pymodule_export]
-    use super::world::World;
+    use super::world::{ChildOrder, World};
     #[pymodule_export]
     #[allow(non_upper_case_globals)]
     const __version__: &str = env!("CARGO_PKG_VERSION");

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ._core import (
     BitMatrix,
+    ChildOrder,
     Closest,
     DegenerateWarning,
     HitList,
@@ -99,6 +100,7 @@ class Occluders(NamedTuple):
 
 __all__ = [
     "BitMatrix",
+    "ChildOrder",
     "Closest",
     "DegenerateWarning",
     "HitList",

@@ -353,6 +353,10 @@ class Scene(Queries):
     def __reduce__(self) -> tuple[Callable[..., Scene], tuple[Any, ...]]: ...
 
 @final
+class ChildOrder:
+    pass
+
+@final
 class World(Queries):
     def __new__(
         cls,
@@ -377,8 +381,10 @@ class World(Queries):
         distance: ArrayLike | None = None,
         *,
         near: ArrayLike | None = None,
+        adopt: bool = True,
         threads: int | None = None,
-    ) -> None: ...
+    ) -> ChildOrder: ...
+    def adopt(self, order: ChildOrder) -> None: ...
     @property
     def transforms(self) -> NDArray[np.float64]: ...
     @property
