@@ -59,7 +59,7 @@ pub fn hits<'py>(
     let indices = match &scene.parts.parts[..] {
         [part] => match &**part {
             Part::Mesh { indices, .. } => Some(indices),
-            Part::Spheres(_) => None,
+            Part::Spheres(_) | Part::Curves(_) => None,
         },
         _ => None,
     };
@@ -209,7 +209,7 @@ pub fn choices<'a>(
     let wanted = match &scene.parts.parts[..] {
         [part] => match &**part {
             Part::Mesh { positions, .. } => positions.len(),
-            Part::Spheres(_) => 0,
+            Part::Spheres(_) | Part::Curves(_) => 0,
         },
         _ => 0,
     };

@@ -8,6 +8,7 @@ use antumbra::{
     Sphere,
 };
 
+use crate::curves::Segments;
 use crate::scene::SceneData;
 
 /// One mesh, or what else has an index of its own.
@@ -20,6 +21,7 @@ pub enum Part {
         opacity: Option<Arc<dyn Opacity>>,
     },
     Spheres(Vec<Sphere>),
+    Curves(Segments),
 }
 
 /// Meshes and where they stand.
@@ -31,6 +33,8 @@ pub struct Parts {
     /// Parts of every object.
     pub objects: Vec<Vec<u32>>,
     pub instances: Vec<Instance>,
+    /// How each instance is reached, if instances are in assemblies: as many places for each, -1 behind the last one.
+    pub paths: Vec<i32>,
     pub local: LocalOrigin,
     /// Origins that the objects of a world have, seen from the meshes as they were given.
     pub origins: Vec<[f64; 3]>,
@@ -54,14 +58,16 @@ impl Part {
                 None => Geometry::triangles(&positions[..], &indices[..]),
             },
             Self::Spheres(spheres) => Geometry::spheres(&spheres[..]),
+            Self::Curves(segments) => Geometry::curves(segments.geometry()),
         }
     }
 
-    /// Triangles and spheres.
+    /// Triangles, spheres or segments.
     pub fn len(&self) -> usize {
         match self {
             Self::Mesh { indices, .. } => indices.len(),
             Self::Spheres(spheres) => spheres.len(),
+            Self::Curves(segments) => segments.firsts.len(),
         }
     }
 }
@@ -96,10 +102,25 @@ impl Parts {
         self.instances.is_empty() && (0..).zip(&self.world).all(|(index, &part)| index == part)
     }
 
-    pub fn has_spheres(&self) -> bool {
-        self.parts
-            .iter()
-            .any(|part| matches!(**part, Part::Spheres(_)))
+    /// Whether there is anything but triangles.
+    pub fn has_others(&self) -> bool {
+        let is_mesh = |part: &Arc<Part>| matches!(**part, Part::Mesh { .. });
+        !self.parts.iter().all(is_mesh)
+    }
+
+    pub fn has_curves(&self) -> bool {
+        let is_it = |part: &Arc<Part>| matches!(**part, Part::Curves(_));
+        self.parts.iter().any(is_it)
+    }
+
+    /// Number of a curve, and how far along it a hit is; `None` for what is no curve.
+    pub fn along_curve(&self, ids: Ids, u: f32) -> Option<(i32, f32)> {
+        let Part::Curves(segments) = &**self.parts.get(usize::try_from(ids.mesh).ok()?)? else {
+            return None;
+        };
+        let place = segments.places.get(usize::try_from(ids.triangle).ok()?)?;
+        let [from, to] = place.along;
+        Some((place.curve as i32, from + u * (to - from)))
     }
 
     /// Number of the mesh that a hit names; `u32::MAX` if there is none.
@@ -144,7 +165,7 @@ impl Parts {
     }
 
     /// Meshes as they stand in the world, as calls of `mesh`: their vertices before they are placed, their triangles, and
-    /// the transform. Meshes of the world come first, then the meshes of every instance. Spheres have no triangles.
+    /// the transform. Meshes of the world come first, then the meshes of every instance. Spheres and curves have no triangles.
     pub fn placed<'a>(
         &'a self,
         mut mesh: impl FnMut(&'a [[f32; 3]], &'a [[u32; 3]], Option<[[f32; 4]; 3]>),
@@ -186,8 +207,9 @@ impl Parts {
                 positions, indices, ..
             } => size_of_val(&positions[..]) + size_of_val(&indices[..]),
             Part::Spheres(spheres) => size_of_val(&spheres[..]),
+            Part::Curves(segments) => segments.bytes(),
         });
-        parts.sum::<usize>() + size_of_val(&self.instances[..])
+        parts.sum::<usize>() + size_of_val(&self.instances[..]) + size_of_val(&self.paths[..])
     }
 
     /// The kernel's `geom_id` and `inst_id` of a mesh.
@@ -204,7 +226,7 @@ impl Parts {
         Some([geom_id as u32, inst_id])
     }
 
-    /// Corners of a triangle in the world, as double precision has them of what the tree has; `None` for a sphere.
+    /// Corners of a triangle in the world, as double precision has them of what the tree has; `None` for spheres and curves.
     pub fn corners(&self, ids: Ids) -> Option<[[f64; 3]; 3]> {
         let Part::Mesh {
             positions, indices, ..

@@ -2,7 +2,8 @@
 //!
 //! A door: arguments become what the kernel and its companions take, and answers become arrays. Nothing is decided here.
 //!
-//! - `arrays`: arguments that are arrays;  `broadcast`: their leading shapes;  `meshes`: meshes and instances
+//! - `arrays`: arguments that are arrays;  `broadcast`: their leading shapes
+//! - `meshes`: meshes of a call;  `curves`: curves;  `placements`: instances
 //! - `geometry`: what scenes are made of;  `scene`: the same with a tree
 //! - `methods`: the class `Queries`, which has what follows;  `scenes`: the class `Scene`;  `world`: the class `World`
 //! - `rays`: rays of a call, in pieces;  `groups`: rays from every point in every direction;  `queries`: what they hit;  `hits`: the results;  `points`: questions about points
@@ -17,6 +18,7 @@ mod arrays;
 mod bake;
 mod bits;
 mod broadcast;
+mod curves;
 mod distinct;
 mod file;
 mod geometry;
@@ -28,6 +30,7 @@ mod memory;
 mod meshes;
 mod methods;
 mod picture;
+mod placements;
 mod points;
 mod queries;
 mod rays;

@@ -3,13 +3,15 @@
 use std::sync::Arc;
 
 use antumbra::{Instance, LocalOrigin};
-use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::arrays::{Numbers, read_faces};
 use crate::broadcast::Operand;
+use crate::curves;
 use crate::geometry::{Part, Parts};
 use crate::memory;
+use crate::placements::{self, Placement};
 
 /// Coordinates this many times as large as the scene is long are brought to an origin of their own: then single precision
 /// would lose more than two of its bits.
@@ -23,10 +25,12 @@ struct Mesh<'py> {
     faces: Vec<[u32; 3]>,
 }
 
-/// A placement before it is rounded: rows of a matrix.
-struct Placement {
-    mesh: usize,
-    rows: [[f64; 4]; 3],
+/// What has a place in the list of meshes, not yet rounded.
+enum Item<'py> {
+    Mesh(Mesh<'py>),
+    Curves(curves::Given<'py>),
+    /// Instances that are placed together.
+    Assembly(Bound<'py, PyAny>),
 }
 
 pub fn read<'py>(
@@ -36,7 +40,7 @@ pub fn read<'py>(
     origin: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Parts> {
     let (meshes, placements) = match faces {
-        Some(faces) => (vec![mesh(vertices, faces)?], Vec::new()),
+        Some(faces) => (vec![Item::Mesh(mesh(vertices, faces)?)], Vec::new()),
         None => list(vertices)?,
     };
     let placements = match instances {
@@ -45,13 +49,11 @@ pub fn read<'py>(
                 "instances: found beside a scene that places its meshes itself, wanted one of both",
             ));
         }
-        Some(instances) => self::placements(instances, meshes.len())?,
+        Some(instances) => placements::placements(instances, meshes.len())?,
         None => placements,
     };
     let mut is_placed = vec![false; meshes.len()];
-    for placement in &placements {
-        is_placed[placement.mesh] = true;
-    }
+    let (placements, paths) = flat(&meshes, placements, &mut is_placed)?;
     let local = match origin {
         Some(origin) if !is_auto(origin)? => LocalOrigin {
             origin: point(origin)?,
@@ -62,14 +64,17 @@ pub fn read<'py>(
     };
     let mut parts = Parts {
         local,
+        paths,
         ..Parts::default()
     };
     // Objects have origins of their own, which their placements make good.
     let mut objects = vec![None; meshes.len()];
     for (index, (mesh, is_placed)) in meshes.into_iter().zip(is_placed).enumerate() {
-        let own = if is_placed {
+        let own = if matches!(mesh, Item::Assembly(_)) {
+            local
+        } else if is_placed {
             let own = LocalOrigin {
-                origin: far_middle(bounds(&mesh.vertices)),
+                origin: far_middle(bounds(mesh.points())),
             };
             objects[index] = Some((parts.objects.len(), own));
             parts.objects.push(vec![index as u32]);
@@ -78,7 +83,7 @@ pub fn read<'py>(
             parts.world.push(index as u32);
             local
         };
-        parts.parts.push(Arc::new(mesh.rounded(&own)));
+        parts.parts.push(Arc::new(mesh.rounded(&own)?));
     }
     memory::grow(&mut parts.instances, placements.len(), "instances")?;
     for placement in placements {
@@ -86,42 +91,61 @@ pub fn read<'py>(
         let Some((object, own)) = objects[placement.mesh] else {
             continue;
         };
-        let instance = placed(object as u32, &placement.rows, own.origin, local.origin);
+        let instance = placements::placed(object as u32, &placement.rows, own.origin, local.origin);
         parts.instances.push(instance);
     }
     Ok(parts)
 }
 
-/// An instance of an object that has an origin of its own, in a world that has one, too.
-pub fn placed(object: u32, rows: &[[f64; 4]; 3], [x, y, z]: [f64; 3], world: [f64; 3]) -> Instance {
-    let transform = [0, 1, 2].map(|axis| {
-        let [a, b, c, d] = rows[axis];
-        let moved = a * x + b * y + c * z + d - world[axis];
-        [a, b, c, moved].map(|number| number as f32)
-    });
-    Instance::new(object, transform)
+/// Placements of meshes alone, and paths to them if there are assemblies: places in the lists from the world inwards.
+fn flat(
+    items: &[Item<'_>],
+    placements: Vec<Placement>,
+    is_placed: &mut [bool],
+) -> PyResult<(Vec<Placement>, Vec<i32>)> {
+    let held = |item: &Item<'_>| match item {
+        Item::Assembly(instances) => placements::placements(instances, items.len()).map(Some),
+        _ => Ok(None),
+    };
+    let inside = items.iter().map(held).collect::<PyResult<Vec<_>>>()?;
+    for placement in placements.iter().chain(inside.iter().flatten().flatten()) {
+        is_placed[placement.mesh] = true;
+    }
+    let is_lost =
+        |(held, is_placed): (&Option<Vec<Placement>>, &bool)| held.is_some() && !is_placed;
+    if let Some(lost) = inside.iter().zip(&*is_placed).position(is_lost) {
+        return Err(PyValueError::new_err(format!(
+            "meshes[{lost}]: found an Assembly that nothing places, wanted an instance of it"
+        )));
+    }
+    if inside.iter().all(Option::is_none) {
+        return Ok((placements, Vec::new()));
+    }
+    let flat = placements::flat(&placements, &inside)?;
+    Ok((flat.placements, flat.paths))
 }
 
-/// Objects of a world, one for each mesh, and the meshes of its ground behind them. Nothing is placed yet; `rows` are the
+/// Objects of a world, one for each mesh, and the meshes of its ground behind them. `rows` are the
 /// placements to come, with the object of each, by which the origin is chosen.
 pub fn objects<'py>(
     meshes: &Bound<'py, PyAny>,
     ground: Option<&Bound<'py, PyAny>>,
-    placements: impl FnOnce(usize) -> PyResult<Vec<(usize, [[f64; 4]; 3])>>,
+    rows: impl FnOnce(usize) -> PyResult<Vec<(usize, [[f64; 4]; 3])>>,
     origin: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Parts, Vec<Instance>)> {
     let plain = |list: &Bound<'py, PyAny>, name: &str| {
         let (meshes, placements) = self::list(list)?;
-        match placements.is_empty() {
+        let is_assembly = |item: &Item<'_>| matches!(item, Item::Assembly(_));
+        match placements.is_empty() && !meshes.iter().any(is_assembly) {
             true => Ok(meshes),
             false => Err(PyValueError::new_err(format!(
-                "{name}: found a scene that places its meshes itself, wanted meshes"
+                "{name}: found a scene or an Assembly that places its meshes itself, wanted meshes"
             ))),
         }
     };
     let mut all = plain(meshes, "meshes")?;
     let objects = all.len();
-    let placements = placements(objects)?.into_iter();
+    let placements = rows(objects)?.into_iter();
     let placements = placements.map(|(mesh, rows)| Placement { mesh, rows });
     let placements: Vec<_> = placements.collect();
     if let Some(ground) = ground {
@@ -141,7 +165,7 @@ pub fn objects<'py>(
         let own = match index < objects {
             false => local,
             true => LocalOrigin {
-                origin: far_middle(bounds(&mesh.vertices)),
+                origin: far_middle(bounds(mesh.points())),
             },
         };
         match index < objects {
@@ -151,10 +175,10 @@ pub fn objects<'py>(
             }
             false => parts.world.push(index as u32),
         }
-        parts.parts.push(Arc::new(mesh.rounded(&own)));
+        parts.parts.push(Arc::new(mesh.rounded(&own)?));
     }
     let instances = placements.iter().map(|Placement { mesh, rows }| {
-        placed(*mesh as u32, rows, parts.origins[*mesh], local.origin)
+        placements::placed(*mesh as u32, rows, parts.origins[*mesh], local.origin)
     });
     let instances = memory::collected(instances, placements.len(), "instances")?;
     Ok((parts, instances))
@@ -204,16 +228,14 @@ fn mesh<'py>(vertices: &Bound<'py, PyAny>, faces: &Bound<'py, PyAny>) -> PyResul
 
 /// Meshes of a list or of one object, and placements if that places them. What objects of other packages hold is written in
 /// Python.
-fn list<'py>(meshes: &Bound<'py, PyAny>) -> PyResult<(Vec<Mesh<'py>>, Vec<Placement>)> {
+fn list<'py>(meshes: &Bound<'py, PyAny>) -> PyResult<(Vec<Item<'py>>, Vec<Placement>)> {
     let py = meshes.py();
     let read = py.import("antumbra._meshes")?.getattr("meshes")?;
-    type Pair<'py> = (Bound<'py, PyAny>, Bound<'py, PyAny>);
-    let (pairs, instances): (Vec<Pair<'py>>, Bound<'py, PyAny>) =
+    let (items, instances): (Vec<Bound<'py, PyAny>>, Bound<'py, PyAny>) =
         read.call1((meshes,))?.extract()?;
-    let is_one = pairs.len() == 1;
-    let read = |(index, (vertices, faces)): (usize, Pair<'py>)| {
-        let read = mesh(&vertices, &faces);
-        read.map_err(|error| {
+    let is_one = items.len() == 1;
+    let read = |(index, given): (usize, Bound<'py, PyAny>)| {
+        item(&given).map_err(|error| {
             if is_one {
                 error
             } else {
@@ -221,63 +243,31 @@ fn list<'py>(meshes: &Bound<'py, PyAny>) -> PyResult<(Vec<Mesh<'py>>, Vec<Placem
             }
         })
     };
-    let found: Vec<_> = pairs
+    let found: Vec<_> = items
         .into_iter()
         .enumerate()
         .map(read)
         .collect::<PyResult<_>>()?;
-    let placements = placements(&instances, found.len())?;
+    let placements = placements::placements(&instances, found.len())?;
     Ok((found, placements))
+}
+
+/// One item, as the function in Python gives it: `Curves`, an `Assembly`, or vertices and faces.
+fn item<'py>(given: &Bound<'py, PyAny>) -> PyResult<Item<'py>> {
+    if given.hasattr("instances")? {
+        return Ok(Item::Assembly(given.getattr("instances")?));
+    }
+    if given.hasattr("radii")? {
+        return Ok(Item::Curves(curves::Given::read(given)?));
+    }
+    let (vertices, faces): (Bound<'py, PyAny>, Bound<'py, PyAny>) = given.extract()?;
+    Ok(Item::Mesh(mesh(&vertices, &faces)?))
 }
 
 /// The error, with the place in the list.
 fn in_item(py: Python<'_>, index: usize, error: &PyErr) -> PyErr {
     let text = format!("meshes[{index}]: {}", error.value(py));
     PyErr::from_type(error.get_type(py), text)
-}
-
-fn placements(instances: &Bound<'_, PyAny>, meshes: usize) -> PyResult<Vec<Placement>> {
-    let mut placements = Vec::new();
-    for (index, item) in instances.try_iter()?.enumerate() {
-        let item = item?;
-        let pair = if item.hasattr("mesh")? && item.hasattr("transform")? {
-            (item.getattr("mesh")?, item.getattr("transform")?)
-        } else {
-            item.extract().map_err(|_| {
-                PyTypeError::new_err(format!(
-                    "instances: item {index} is neither an Instance nor a pair (mesh, transform)"
-                ))
-            })?
-        };
-        let mesh: isize = pair.0.extract()?;
-        let Some(mesh) = usize::try_from(mesh).ok().filter(|&mesh| mesh < meshes) else {
-            return Err(PyIndexError::new_err(format!(
-                "instances: item {index} names mesh {mesh}, but there are {meshes} meshes"
-            )));
-        };
-        let matrix = Numbers::read(&pair.1, "transform", 4)?;
-        if !matches!(matrix.shape(), [3 | 4, 4]) {
-            return Err(crate::arrays::wrong_shape(
-                "transform",
-                matrix.shape(),
-                "(4, 4) or (3, 4)",
-            ));
-        }
-        let operand = Operand::new(&matrix, 4, matrix.lead(4));
-        let row = |place| operand.row(place);
-        if matrix.shape()[0] == 4 && row(3) != [0.0, 0.0, 0.0, 1.0] {
-            return Err(PyValueError::new_err(format!(
-                "transform: the last row of instance {index} is {:?}, wanted [0, 0, 0, 1]",
-                row(3)
-            )));
-        }
-        memory::grow(&mut placements, 1, "instances")?;
-        placements.push(Placement {
-            mesh,
-            rows: [0, 1, 2].map(row),
-        });
-    }
-    Ok(placements)
 }
 
 type Bounds = [[f64; 3]; 2];
@@ -293,8 +283,11 @@ fn add(bounds: &mut Bounds, point: [f64; 3]) {
     }
 }
 
-/// Box around the finite vertices of a mesh.
-fn bounds(vertices: &Numbers<'_>) -> Bounds {
+/// Box around the finite points of an item.
+fn bounds(points: Option<&Numbers<'_>>) -> Bounds {
+    let Some(vertices) = points else {
+        return NOTHING;
+    };
     let lead = vertices.lead(3);
     let operand = Operand::new(vertices, 3, lead);
     let mut bounds = NOTHING;
@@ -321,12 +314,16 @@ fn far_middle([low, high]: Bounds) -> [f64; 3] {
 }
 
 /// Origin of a scene: zero if all its vertices are rounded already, and instances keep them so.
-fn automatic(meshes: &[Mesh<'_>], is_placed: &[bool], placements: &[Placement]) -> [f64; 3] {
-    if placements.is_empty() && meshes.iter().all(|mesh| !mesh.vertices.is_f64()) {
+fn automatic(meshes: &[Item<'_>], is_placed: &[bool], placements: &[Placement]) -> [f64; 3] {
+    if placements.is_empty()
+        && meshes
+            .iter()
+            .all(|mesh| !mesh.points().is_some_and(Numbers::is_f64))
+    {
         return [0.0; 3];
     }
     let mut all = NOTHING;
-    let boxes: Vec<_> = meshes.iter().map(|mesh| bounds(&mesh.vertices)).collect();
+    let boxes: Vec<_> = meshes.iter().map(|mesh| bounds(mesh.points())).collect();
     for (bounds, is_placed) in boxes.iter().zip(is_placed) {
         if !is_placed {
             bounds.iter().for_each(|&corner| add(&mut all, corner));
@@ -344,6 +341,29 @@ fn automatic(meshes: &[Mesh<'_>], is_placed: &[bool], placements: &[Placement]) 
         }
     }
     far_middle(all)
+}
+
+impl<'py> Item<'py> {
+    fn points(&self) -> Option<&Numbers<'py>> {
+        match self {
+            Self::Mesh(mesh) => Some(&mesh.vertices),
+            Self::Curves(curves) => Some(&curves.points),
+            Self::Assembly(_) => None,
+        }
+    }
+
+    fn rounded(self, local: &LocalOrigin) -> PyResult<Part> {
+        match self {
+            Self::Mesh(mesh) => Ok(mesh.rounded(local)),
+            Self::Curves(curves) => curves.rounded(local).map(Part::Curves),
+            // Takes a number in the list of meshes.
+            Self::Assembly(_) => Ok(Part::Mesh {
+                positions: Vec::new(),
+                indices: Vec::new(),
+                opacity: None,
+            }),
+        }
+    }
 }
 
 impl Mesh<'_> {

@@ -1023,7 +1023,7 @@ impl Queries {
         py.detach(|| saved::save(&data, &path))
     }
 
-    /// Numbers about the tree: triangles, instances, dropped, nodes, depth, bytes, width, training_rays.
+    /// Numbers about the tree: triangles (with spheres and segments of curves), instances, dropped, nodes, depth, bytes, width, training_rays.
     #[getter]
     fn report<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let data = self.data();
@@ -1051,6 +1051,30 @@ impl Queries {
         data.local().origin.into()
     }
 
+    /// How each instance is reached: int64 of shape (instances, depth), places in the list of instances of the scene, then in those of the
+    /// ``Assembly`` that is placed there, and so on. -1 behind the last place.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> import numpy as np
+    /// >>> roof = am.Mesh([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> am.Scene([roof], instances=[(0, np.eye(4)), (0, np.diag([2, 2, 2, 1]))]).paths
+    /// array([[0],
+    ///        [1]])
+    #[getter]
+    fn paths<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<i64>>> {
+        let data = self.data();
+        let (paths, count) = (&data.parts.paths, data.parts.instances.len());
+        let depth = paths.len().checked_div(count).unwrap_or(0).max(1);
+        let places = (0..count * depth).map(|place| match paths.get(place) {
+            Some(&place) => i64::from(place),
+            None => place as i64,
+        });
+        let places = memory::collected(places, count * depth, "paths")?;
+        shaped(py, places, &[count, depth])
+    }
+
     /// Smallest box around everything: float64 of shape (2, 3), NaN if there is nothing.
     #[getter]
     fn bounds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
@@ -1067,8 +1091,8 @@ impl Queries {
 
     /// Vertices of all triangles in the world: float64 of shape (n, 3), as the tree has them, rounded around ``origin``.
     ///
-    /// Meshes that no instance places come first, then the meshes of every instance, at its place. Spheres are
-    /// left out. Computed on every use from what the scene keeps beside its tree: 12 bytes for each vertex and 12 for each triangle, which
+    /// Meshes that no instance places come first, then the meshes of every instance, at its place. Spheres and
+    /// curves are left out. Computed on every use from what the scene keeps beside its tree: 12 bytes for each vertex and 12 for each triangle, which
     /// ``sys.getsizeof`` counts.
     ///
     /// Examples
@@ -1100,8 +1124,8 @@ impl Queries {
 
     /// Triangles of all meshes: int64 of shape (m, 3), rows of ``vertices``. Those that can never be hit are among them.
     ///
-    /// Meshes that no instance places come first, then the meshes of every instance, at its place. Spheres are
-    /// left out. Computed on every use from what the scene keeps beside its tree: 12 bytes for each vertex and 12 for each triangle, which
+    /// Meshes that no instance places come first, then the meshes of every instance, at its place. Spheres and
+    /// curves are left out. Computed on every use from what the scene keeps beside its tree: 12 bytes for each vertex and 12 for each triangle, which
     /// ``sys.getsizeof`` counts.
     ///
     /// Examples
@@ -1132,8 +1156,8 @@ impl Queries {
     ///
     /// Triangles have their corners counterclockwise seen from where their normals point. A vertex without triangles has the normal 0.
     ///
-    /// Meshes that no instance places come first, then the meshes of every instance, at its place. Spheres are
-    /// left out. Computed on every use from what the scene keeps beside its tree: 12 bytes for each vertex and 12 for each triangle, which
+    /// Meshes that no instance places come first, then the meshes of every instance, at its place. Spheres and
+    /// curves are left out. Computed on every use from what the scene keeps beside its tree: 12 bytes for each vertex and 12 for each triangle, which
     /// ``sys.getsizeof`` counts.
     ///
     /// Examples
@@ -1263,10 +1287,14 @@ impl Queries {
             0 => String::new(),
             count => format!(", {count} instances"),
         };
-        let (meshes, triangles) = (data.parts.parts.len(), report.primitives);
+        let (meshes, primitives) = (data.parts.parts.len(), report.primitives);
+        let kind = match data.has_others {
+            true => "primitives",
+            false => "triangles",
+        };
         let name = slf.get_type().name()?;
         Ok(format!(
-            "<antumbra.{name}: {meshes} meshes, {triangles} triangles{instances}>"
+            "<antumbra.{name}: {meshes} meshes, {primitives} {kind}{instances}>"
         ))
     }
 

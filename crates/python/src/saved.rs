@@ -12,17 +12,22 @@ use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
 
+use crate::curves::{Place, Segments};
 use crate::geometry::{Part, Parts};
 use crate::scene::{Quality, SceneData, Tree, raised};
 
 /// What pickle keeps of an object: a function that makes it anew, and arguments of that function.
 pub type Reduced<'py, A> = PyResult<(Bound<'py, PyAny>, A)>;
 
-/// First bytes of a file. The last one is the version: 2 if there are masks, or a world.
+/// First bytes of a file. The last one is the version: 2 if there are masks, or a world; 3 if there are curves or
+/// assemblies.
 const SIGNATURE: [u8; 8] = *b"AntumPy\x01";
 
 /// Version of files that say what kind of tree follows, and have masks.
 const SECOND: u8 = 2;
+
+/// Version of files with curves or paths to instances, as the second otherwise.
+const THIRD: u8 = 3;
 
 /// Bytes of signature, length and checksum.
 const HEAD: usize = 24;
@@ -69,8 +74,9 @@ pub fn to_bytes(scene: &SceneData) -> PyResult<Vec<u8>> {
     let (masks, instance_masks) = (&scene.parts.masks, &scene.parts.instance_masks);
     let world = scene.world();
     let mut signature = SIGNATURE;
-    if world.is_some() || !masks.is_empty() || !instance_masks.is_empty() {
-        signature[7] = SECOND;
+    let is_third = scene.parts.has_curves() || !scene.parts.paths.is_empty();
+    if world.is_some() || !masks.is_empty() || !instance_masks.is_empty() || is_third {
+        signature[7] = if is_third { THIRD } else { SECOND };
         out.list(masks);
         out.list(instance_masks);
         out.long(u64::from(world.is_some()));
@@ -78,6 +84,10 @@ pub fn to_bytes(scene: &SceneData) -> PyResult<Vec<u8>> {
         for number in scene.parts.origins.as_flattened() {
             out.long(number.to_bits());
         }
+    }
+    if is_third {
+        out.long(scene.parts.paths.len() as u64);
+        out.words(scene.parts.paths.iter().map(|&place| place as u32));
     }
     let parts = out.bytes;
     let mut bytes = Vec::new();
@@ -114,9 +124,9 @@ pub fn from_bytes(bytes: &[u8]) -> PyResult<Arc<SceneData>> {
         ));
     }
     let version = bytes[7];
-    if !(SIGNATURE[7]..=SECOND).contains(&version) {
+    if !(SIGNATURE[7]..=THIRD).contains(&version) {
         return Err(PyValueError::new_err(format!(
-            "cannot read the scene: found version {version}, wanted 1 to {SECOND}"
+            "cannot read the scene: found version {version}, wanted 1 to {THIRD}"
         )));
     }
     let mut head = Reader { bytes: &bytes[8..] };
@@ -132,7 +142,7 @@ pub fn from_bytes(bytes: &[u8]) -> PyResult<Arc<SceneData>> {
     let mut reader = Reader { bytes: parts };
     let (mut parts, quality) = reader.parts().ok_or_else(damaged)?;
     let mut is_world = false;
-    if version == SECOND {
+    if version >= SECOND {
         parts.masks = reader.list().ok_or_else(damaged)?;
         parts.instance_masks = reader.list().ok_or_else(damaged)?;
         is_world = reader.long().ok_or_else(damaged)? != 0;
@@ -143,6 +153,10 @@ pub fn from_bytes(bytes: &[u8]) -> PyResult<Arc<SceneData>> {
             }
             parts.origins.push(origin);
         }
+    }
+    if version == THIRD {
+        let paths = reader.list().ok_or_else(damaged)?;
+        parts.paths = paths.into_iter().map(|place| place as i32).collect();
     }
     if !reader.bytes.is_empty() {
         return Err(damaged());
@@ -200,6 +214,16 @@ impl Writer {
                     for sphere in spheres {
                         self.floats(&sphere.center);
                         self.floats(&[sphere.radius]);
+                    }
+                }
+                Part::Curves(segments) => {
+                    self.long(2);
+                    self.long(segments.points.len() as u64);
+                    self.floats(segments.points.as_flattened());
+                    self.list(&segments.firsts);
+                    for place in &segments.places {
+                        self.words([place.curve].into_iter());
+                        self.floats(&place.along);
                     }
                 }
             }
@@ -270,6 +294,7 @@ impl Reader<'_> {
             let part = match self.long()? {
                 0 => self.mesh()?,
                 1 => self.spheres()?,
+                2 => self.curves()?,
                 _ => return None,
             };
             parts.parts.push(Arc::new(part));
@@ -310,5 +335,22 @@ impl Reader<'_> {
             radius,
         });
         Some(Part::Spheres(spheres.collect()))
+    }
+
+    fn curves(&mut self) -> Option<Part> {
+        let points = self.rows::<4>()?.into_iter();
+        let points = points.map(|row| row.map(f32::from_bits)).collect();
+        let firsts = self.list()?;
+        let places = self.words(firsts.len().checked_mul(3)?)?;
+        let places = places.as_chunks().0.iter();
+        let places = places.map(|&[curve, from, to]| Place {
+            curve,
+            along: [from, to].map(f32::from_bits),
+        });
+        Some(Part::Curves(Segments {
+            points,
+            firsts,
+            places: places.collect(),
+        }))
     }
 }

@@ -20,7 +20,8 @@ pub struct SceneData {
     pub parts: Arc<Parts>,
     /// See [`Parts::is_plain`].
     pub is_plain: bool,
-    pub has_spheres: bool,
+    /// See [`Parts::has_others`].
+    pub has_others: bool,
     pub quality: Quality,
 }
 
@@ -71,7 +72,7 @@ impl SceneData {
             // Instances of a world come later.
             is_plain: matches!(tree, Tree::Fixed(_)) && parts.is_plain(),
             tree,
-            has_spheres: parts.has_spheres(),
+            has_others: parts.has_others(),
             parts: Arc::new(parts),
             quality,
         };
@@ -91,7 +92,7 @@ impl SceneData {
 
     /// Whether all there is are triangles that no instance places.
     pub fn has_only_world_triangles(&self) -> bool {
-        self.parts.instances.is_empty() && !self.has_spheres
+        self.parts.instances.is_empty() && !self.has_others
     }
 
     pub fn world(&self) -> Option<&World> {
@@ -193,7 +194,7 @@ pub fn warn(py: Python<'_>, report: &BuildReport) -> PyResult<()> {
     let found = report.dropped;
     let all = found + report.primitives;
     let text = format!(
-        "{found} of {all} triangles or instances can never be hit and were left out: two corners coincide, a number is not finite, or a transform has no inverse"
+        "{found} of {all} triangles, segments or instances can never be hit and were left out: two corners coincide, a number is not finite, or a transform has no inverse"
     );
     let text = std::ffi::CString::new(text)?;
     PyErr::warn(py, &py.get_type::<DegenerateWarning>(), &text, 1)

@@ -24,12 +24,13 @@ use crate::{file, memory, meshes, saved};
 /// vertices : array (n, 3) of float32, float64 or integers, a mesh, or a list of meshes
 ///     Vertices, or without faces: a pair ``(vertices, faces)`` or an object with these attributes, such as ``trimesh.Trimesh``; a
 ///     ``TriangleMesh`` of Open3D, legacy or of tensors; ``pyvista.PolyData``; ``meshio.Mesh``; or a list of these. Polygons are
-///     cut into triangles, quads from their first corner. A ``trimesh.Scene`` has one instance for each node of its graph, in the order of
+///     cut into triangles, quads from their first corner. ``Curves`` are hairs, grass or wires. A ``trimesh.Scene`` has one instance for each node of its graph, in the order of
 ///     ``scene.graph.nodes_geometry``.
 /// faces : array (m, 3) of integers, optional
 ///     Three vertices per triangle.
 /// instances : sequence of Instance or of (mesh, transform), optional
-///     Placements. A mesh that any instance names stands in the world by its instances only.
+///     Placements. A mesh that any instance names stands in the world by its instances only. An ``Assembly`` in the list of meshes has
+///     instances that are placed together.
 /// origin : "auto" or (3,), optional
 ///     Point that the tree has as its zero. Vertices and rays are brought there in double precision, and are then rounded
 ///     to float32. "auto" is the middle of the vertices where they are far from zero for their extent, as maps are, and zero

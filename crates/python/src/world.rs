@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use antumbra::{Build, Geometry, LocalOrigin, Object, Recipe};
 use numpy::{PyArray1, PyArrayDyn};
-use pyo3::exceptions::{PyIndexError, PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 
@@ -16,6 +16,7 @@ use crate::geometry::{Part, Parts};
 use crate::memory;
 use crate::meshes;
 use crate::methods::Queries;
+use crate::placements;
 use crate::rays::{Call, Conditions, RayArguments, RaySource};
 use crate::saved::{self, Reduced};
 use crate::scene::{Quality, SceneData, Tree, raised, warn};
@@ -129,8 +130,8 @@ impl World {
     ) -> PyResult<PyClassInitializer<Self>> {
         let quality = Quality::read(quality)?;
         let mut call = Call::new(threads, progress)?;
-        let placements = |count| placements(transforms, objects, count, &[]);
-        let (mut parts, instances) = meshes::objects(meshes, ground, placements, origin)?;
+        let rows = |count| rows(transforms, objects, count, &[]);
+        let (mut parts, instances) = meshes::objects(meshes, ground, rows, origin)?;
         let made = watch(py, &call.threads, &mut call.progress, |signals| {
             let recipe = quality.recipe();
             let build = |list: &[u32]| {
@@ -192,12 +193,12 @@ impl World {
         let data = slf.as_super().get().data();
         let parts = &data.parts;
         let before: Vec<_> = parts.instances.iter().map(|placed| placed.object).collect();
-        let placements = placements(Some(transforms), objects, parts.objects.len(), &before)?;
-        let instances = placements.iter().map(|(object, rows)| {
+        let rows = rows(Some(transforms), objects, parts.objects.len(), &before)?;
+        let instances = rows.iter().map(|(object, rows)| {
             let own = parts.origins[*object];
-            meshes::placed(*object as u32, rows, own, parts.local.origin)
+            placements::placed(*object as u32, rows, own, parts.local.origin)
         });
-        let instances = memory::collected(instances, placements.len(), "instances")?;
+        let instances = memory::collected(instances, rows.len(), "instances")?;
         // Whoever has the world alone changes it in place.
         drop(data);
         Self::change(slf, threads, |world, parts| {
@@ -256,7 +257,9 @@ impl World {
                 positions, indices, ..
             } = &*parts.parts[place]
             else {
-                return Err(PyRuntimeError::new_err("a world has no spheres"));
+                return Err(PyValueError::new_err(format!(
+                    "vertices: found mesh {place}, which is curves, wanted a mesh of triangles"
+                )));
             };
             let numbers = Numbers::read(&vertices, "vertices", 3)?;
             if numbers.rows()? != positions.len() {
@@ -501,7 +504,7 @@ fn geometries<'a>(parts: &'a Parts, list: &[u32]) -> Vec<Geometry<'a>> {
 }
 
 /// Object and matrix of every instance. Without objects, instances place what they placed before, or the one object.
-fn placements(
+fn rows(
     transforms: Option<&Bound<'_, PyAny>>,
     objects: Option<&Bound<'_, PyAny>>,
     count: usize,

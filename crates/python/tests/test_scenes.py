@@ -249,3 +249,69 @@ def test_pbrt_files_have_spheres_and_instances(tmp_path):
     np.testing.assert_allclose(both.normal, both.point, atol=1e-6)
     scene.save(tmp_path / "saved")
     same_answers(scene, am.Scene.load(tmp_path / "saved"))
+
+
+def test_assemblies_are_instances_of_instances():
+    rng = np.random.default_rng(5)
+    leaf, other = soup(rng, 40), box((-0.1,) * 3, (0.1,) * 3)
+
+    def anywhere(reach):
+        matrix = np.eye(4)
+        matrix[:3] = np.concatenate([np.eye(3) + 0.3 * rng.normal(size=(3, 3)), reach * rng.normal(size=(3, 1))], 1)
+        return matrix
+
+    twig = [(0, anywhere(1)), (1, anywhere(1)), (0, anywhere(1))]
+    bough = [(3, anywhere(3)), (0, anywhere(3)), (2, anywhere(3))]
+    tree = [(4, anywhere(9)), (2, anywhere(9)), (1, anywhere(9))]
+    # An empty assembly has no paths.
+    meshes = [leaf, other, am.Assembly(twig), am.Assembly([]), am.Assembly(bough), box((-90, -90, -30), (90, 90, -29))]
+    scene = am.Scene(meshes, instances=tree)
+    lists = {2: twig, 3: [], 4: bough}
+
+    def flat(placements, outer, path):
+        for place, (mesh, matrix) in enumerate(placements):
+            here = outer @ matrix
+            yield from flat(lists[mesh], here, [*path, place]) if mesh in lists else [(mesh, here, [*path, place])]
+
+    expected = list(flat(tree, np.eye(4), []))
+    plain = am.Scene([leaf, other, meshes[5]], instances=[(mesh, matrix) for mesh, matrix, _ in expected])
+    assert [[place for place in path if place >= 0] for path in scene.paths.tolist()] == [path for *_, path in expected]
+    assert scene.paths.shape == (8, 3)
+    origins = rng.uniform(-20, 20, (4000, 3))
+    directions = np.stack([matrix[:3, 3] for _, matrix, _ in expected])[rng.integers(0, 8, 4000)] + rng.normal(size=(4000, 3)) - origins
+    hits, same = scene.intersect(origins, directions), plain.intersect(origins, directions)
+    assert set(hits.instance) == set(range(-1, 8))
+    for name in ("t", "triangle", "instance", "point"):
+        np.testing.assert_array_equal(getattr(hits, name), getattr(same, name))
+    np.testing.assert_array_equal(hits.mesh, np.where(same.mesh == 2, 5, same.mesh))
+    again = pickle.loads(pickle.dumps(scene.learn(origins[:500], directions[:500])))
+    np.testing.assert_array_equal(again.paths, scene.paths)
+    np.testing.assert_array_equal(again.intersect(origins, directions).t, hits.t)
+    assert plain.paths.tolist() == [[place] for place in range(8)] and am.Scene([leaf]).paths.shape == (0, 1)
+
+
+def test_assemblies_on_maps_keep_their_centimetres():
+    def at(x, y):
+        return np.array([[1, 0, 0, x], [0, 1, 0, y], [0, 0, 1, 0]])
+
+    post = box((0, 0, 0), (0.02, 0.02, 1))
+    row = am.Assembly([(0, at(x, 0)) for x in range(3)])
+    scene = am.Scene([post, row], instances=[(1, at(4_500_000, 5_400_000)), (1, at(4_500_000, 5_400_010.25))])
+    x = 4_500_000 + np.arange(-0.02, 2.1, 0.01)
+    found = scene.occluded(np.stack([x, np.full_like(x, 5_400_010.26), np.full_like(x, 9.0)], -1), [0, 0, -1])
+    inside = (x - 4_500_000) % 1
+    sure = (np.abs(inside) > 0.002) & (np.abs(inside - 0.02) > 0.002) & (inside < 0.998)
+    np.testing.assert_array_equal(found[sure], (inside < 0.02)[sure])
+
+
+def test_assemblies_that_cannot_be_are_refused():
+    move = np.eye(4)
+    mesh = box()
+    with pytest.raises(ValueError, match="object 1 holds an instance of itself"):
+        am.Scene([mesh, am.Assembly([(2, move)]), am.Assembly([(1, move)])], instances=[(1, move)])
+    with pytest.raises(ValueError, match=r"meshes\[1\]: found an Assembly that nothing places"):
+        am.Scene([mesh, am.Assembly([(0, move)])])
+    with pytest.raises(IndexError, match="item 0 names mesh 7, but there are 2 meshes"):
+        am.Scene([mesh, am.Assembly([(7, move)])], instances=[(1, move)])
+    with pytest.raises(ValueError, match="found a scene or an Assembly that places its meshes itself"):
+        am.World([mesh, am.Assembly([(0, move)])], [move], [0])

@@ -52,6 +52,34 @@ class Mesh(NamedTuple):
     """Three vertices per triangle, of shape (m, 3)."""
 
 
+class Curves(NamedTuple):
+    """Thin curves, such as hairs, grass and wires: one item in the list of meshes of a scene.
+
+    Curves are flat and face every ray: a ray hits what is within the radius of the axis. Straight segments stand for cubic curves, and are no
+    farther from them than a tenth of the largest radius. Inner points join segments without a gap. Both ends are cut off flat.
+
+    A hit has the number of the segment in ``triangle``, the number of the curve in ``curve`` and the parameter in ``along``.
+
+    Examples
+    --------
+    >>> import antumbra as am
+    >>> wires = am.Curves([[[0, 0, 1], [4, 0, 1], [4, 4, 1]]], 0.1)
+    >>> scene = am.Scene(wires)
+    >>> hits = scene.intersect([[1, 0.05, 0], [1, 0.2, 0], [4, 1, 0]], [0, 0, 1])
+    >>> hits.curve, hits.along
+    (array([ 0, -1,  0], dtype=int32), array([0.25,  nan, 1.25], dtype=float32))
+    """
+
+    points: Any
+    """Points of shape (n, 3) for one curve, (..., n, 3) for many curves of n points, or (n, 3) with ``counts``."""
+    radii: Any
+    """Radii of the points: a number, or an array that is broadcast to the shape of the points without its last axis."""
+    kind: str = "linear"
+    """"linear"; "bezier", cubic and of 4, 7, 10, ... points; "bspline" or "catmull-rom", cubic and of at least 4 points."""
+    counts: Any = None
+    """Number of points of each curve, of shape (k,), where curves of different lengths are one after the other."""
+
+
 class Instance(NamedTuple):
     """A placement of a mesh: the same as the pair ``(mesh, transform)``.
 
@@ -68,6 +96,31 @@ class Instance(NamedTuple):
     """Place of the mesh in the list of meshes."""
     transform: Any
     """Affine map from the mesh to the world, of shape (4, 4) or (3, 4), translation in the last column."""
+
+
+class Assembly(NamedTuple):
+    """Instances that are placed together: one item in the list of meshes of a ``Scene``, for instances of instances to any depth.
+
+    Each path from the scene to a mesh is an instance of its own: ``hits.instance`` is its number, and ``scene.paths[hits.instance]``
+    the way to it.
+
+    Examples
+    --------
+    >>> import antumbra as am
+    >>> import numpy as np
+    >>> def at(x):
+    ...     return np.array([[1, 0, 0, x], [0, 1, 0, 0], [0, 0, 1, 0]])
+    >>> leaf = am.Mesh([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    >>> twig = am.Assembly([am.Instance(0, at(0)), am.Instance(0, at(2))])
+    >>> scene = am.Scene([leaf, twig], instances=[am.Instance(1, at(0)), am.Instance(1, at(10))])
+    >>> hits = scene.intersect([[0.2, 0.2, 0], [12.2, 0.2, 0]], [0, 0, 1])
+    >>> scene.paths[hits.instance]
+    array([[0, 0],
+           [1, 1]])
+    """
+
+    instances: Any
+    """Sequence of ``Instance`` or of (mesh, transform): places in the list of meshes of the scene, also of other assemblies."""
 
 
 class Occluders(NamedTuple):
@@ -99,9 +152,11 @@ class Occluders(NamedTuple):
 
 
 __all__ = [
+    "Assembly",
     "BitMatrix",
     "ChildOrder",
     "Closest",
+    "Curves",
     "DegenerateWarning",
     "HitList",
     "Hits",

@@ -18,17 +18,19 @@ Placement = tuple[int, Any]
 
 _WANTED = (
     "wanted vertices and faces, a mesh (of trimesh, Open3D, pyvista or meshio, or any object with vertices and faces), "
-    "a trimesh.Scene, or a list of pairs (vertices, faces) and meshes"
+    "Curves, a trimesh.Scene, or a list of these, of pairs (vertices, faces) and of Assembly"
 )
 
 
-def meshes(given: Any) -> tuple[list[Pair], list[Placement]]:
-    """Meshes of an object or of a list of objects, and where they are placed if the objects say so."""
+def meshes(given: Any) -> tuple[list[Any], list[Placement]]:
+    """Meshes of an object or of a list of objects, and where they are placed if the objects say so. Curves and assemblies stay what they are."""
     if isinstance(given, (str, os.PathLike)):
         raise TypeError(f"meshes: found the path {os.fspath(given)!r}, {_WANTED}; use Scene.from_file to read a file")
     scene = _trimesh_scene(given)
     if scene is not None:
         return scene
+    if _is_taken_whole(given):
+        return [given], []
     mesh = _mesh(given, "meshes")
     if mesh is not None:
         return [mesh], []
@@ -43,9 +45,12 @@ def meshes(given: Any) -> tuple[list[Pair], list[Placement]]:
             raise TypeError(f"meshes: found an array of shape {shape}, {_WANTED}{hint}")
     if not isinstance(given, Iterable):
         raise TypeError(f"meshes: found {_name(given)}, {_WANTED}")
-    pairs: list[Pair] = []
+    pairs: list[Any] = []
     placements: list[Placement] = []
     for place, item in enumerate(given):
+        if _is_taken_whole(item):
+            pairs.append(item)
+            continue
         scene = _trimesh_scene(item)
         if scene is not None:
             placements += [(len(pairs) + mesh, transform) for mesh, transform in scene[1]]
@@ -56,6 +61,11 @@ def meshes(given: Any) -> tuple[list[Pair], list[Placement]]:
             mesh = _pair(item, place)
         pairs.append(mesh)
     return pairs, placements
+
+
+def _is_taken_whole(given: Any) -> bool:
+    """Whether something is as the classes Curves or Assembly."""
+    return all(hasattr(given, name) for name in ("points", "radii", "kind", "counts")) or hasattr(given, "instances")
 
 
 def _pair(item: Any, place: int) -> Pair:

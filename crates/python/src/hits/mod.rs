@@ -59,13 +59,13 @@ impl Arrays {
         self.t.bind(py).shape().to_vec()
     }
 
-    /// Numbers of every hit, three each: `of` computes them from the ids, the weights, the distance and the place in the list.
+    /// Something for every hit: `of` computes it from the ids, the weights, the distance and the place in the list.
     /// Work is done by the threads of the default, without the lock of the interpreter.
-    fn vectors<T: Copy + Send + Sync>(
+    fn each<T: Copy + Send + Sync>(
         &self,
         py: Python<'_>,
         nothing: T,
-        of: impl Fn(Ids, [f32; 2], f32, usize) -> Option<[T; 3]> + Sync + Send,
+        of: impl Fn(Ids, [f32; 2], f32, usize) -> Option<T> + Sync + Send,
     ) -> PyResult<Vec<T>> {
         let read = |array: &Py<PyArrayDyn<i32>>| array.bind(py).try_readonly();
         let error =
@@ -79,27 +79,27 @@ impl Arrays {
         let (triangle, mesh, instance) =
             (triangle.as_slice()?, mesh.as_slice()?, instance.as_slice()?);
         let t = t.as_slice()?;
-        let vector = |place: usize| {
+        let item = |place: usize| {
             let ids = Ids {
                 triangle: triangle[place],
                 mesh: mesh[place],
                 instance: instance[place],
             };
             let weights = [uv[2 * place], uv[2 * place + 1]];
-            of(ids, weights, t[place], place).unwrap_or([nothing; 3])
+            of(ids, weights, t[place], place).unwrap_or(nothing)
         };
         let threads = Threads::of(None)?;
         let count = triangle.len();
         py.detach(|| {
             // Written once: memory that is touched for the first time costs more than most of what is computed.
-            let mut all = memory::room(count, "vectors")?;
+            let mut all = memory::room(count, "places of hits")?;
             if count <= SOME || threads.count() == 1 {
-                all.extend((0..count).map(vector));
+                all.extend((0..count).map(item));
             } else {
                 let places = (0..count).into_par_iter().with_min_len(SOME);
-                threads.run(|| places.map(vector).collect_into_vec(&mut all));
+                threads.run(|| places.map(item).collect_into_vec(&mut all));
             }
-            Ok(all.into_flattened())
+            Ok(all)
         })
     }
 
@@ -111,7 +111,7 @@ impl Arrays {
         let made = self.point.get_or_try_init(py, || {
             let source = source.ok_or_else(gone)?;
             let meshes = Meshes::of(&source.parts);
-            let points = self.vectors(py, f64::NAN, |ids, uv, t, place| {
+            let points = self.each(py, [f64::NAN; 3], |ids, uv, t, place| {
                 if ids.triangle < 0 {
                     return None;
                 }
@@ -119,7 +119,9 @@ impl Arrays {
                     .point(ids, uv)
                     .or_else(|| source.point_on_ray(t, place))
             })?;
-            Ok::<_, PyErr>(shaped(py, points, &self.shape_of_vectors(py))?.unbind())
+            Ok::<_, PyErr>(
+                shaped(py, points.into_flattened(), &self.shape_of_vectors(py))?.unbind(),
+            )
         })?;
         Ok(made.bind(py).clone())
     }
@@ -132,7 +134,7 @@ impl Arrays {
         let made = self.normal.get_or_try_init(py, || {
             let source = source.ok_or_else(gone)?;
             let meshes = Meshes::of(&source.parts);
-            let normals = self.vectors(py, f32::NAN, |ids, uv, t, place| {
+            let normals = self.each(py, [f32::NAN; 3], |ids, uv, t, place| {
                 if ids.triangle < 0 {
                     return None;
                 }
@@ -140,7 +142,9 @@ impl Arrays {
                     .normal(ids)
                     .or_else(|| source.normal_on_ray(ids, uv, t, place))
             })?;
-            Ok::<_, PyErr>(shaped(py, normals, &self.shape_of_vectors(py))?.unbind())
+            Ok::<_, PyErr>(
+                shaped(py, normals.into_flattened(), &self.shape_of_vectors(py))?.unbind(),
+            )
         })?;
         Ok(made.bind(py).clone())
     }
@@ -154,7 +158,7 @@ impl Arrays {
 
 fn gone() -> PyErr {
     pyo3::exceptions::PyRuntimeError::new_err(
-        "hits that were pickled have no scene: ask for point and normal before, and they go along",
+        "hits that were pickled have no scene: point and normal go along if they were used before",
     )
 }
 
@@ -370,7 +374,7 @@ impl Hits {
         self.arrays.t.bind(py).clone()
     }
 
-    /// Place of the triangle in the faces of its mesh: int32.
+    /// Place of the triangle in the faces of its mesh, or of the segment in its curves: int32.
     #[getter]
     fn triangle<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<i32>> {
         self.arrays.triangle.bind(py).clone()
@@ -388,7 +392,8 @@ impl Hits {
         self.arrays.instance.bind(py).clone()
     }
 
-    /// Weights of the second and third corner of the triangle: float32 of shape (..., 2).
+    /// Weights of the second and third corner of the triangle: float32 of shape (..., 2). On a curve, the share of the
+    /// segment's length, and the place across the curve from 0 to 1.
     #[getter]
     fn uv<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<f32>> {
         self.arrays.uv.bind(py).clone()
@@ -410,10 +415,30 @@ impl Hits {
     }
 
     /// Geometric normal, of length 1: float32 of shape (..., 3). A triangle's corners run counterclockwise seen from where
-    /// it points. Made on first use.
+    /// it points. The normal of a curve is perpendicular to its axis and faces the ray. Made on first use.
     #[getter]
     fn normal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         self.arrays.normal(py, self.source.as_ref())
+    }
+
+    /// Number of the curve in its ``Curves``, -1 for hits on anything else: int32. Made on every use.
+    #[getter]
+    fn curve<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<i32>>> {
+        let parts = &self.source.as_ref().ok_or_else(gone)?.parts;
+        let of = |ids, [u, _]: [f32; 2], _, _| Some(parts.along_curve(ids, u)?.0);
+        let curves = self.arrays.each(py, -1, of)?;
+        shaped(py, curves, &self.arrays.shape(py))
+    }
+
+    /// How far along the curve, each of whose pieces is 1 long: float32. NaN for hits on anything else. Made on every use.
+    ///
+    /// A piece goes from point to point of linear curves and B-splines. In a Bezier curve it goes from each third point to the next.
+    #[getter]
+    fn along<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let parts = &self.source.as_ref().ok_or_else(gone)?.parts;
+        let of = |ids, [u, _]: [f32; 2], _, _| Some(parts.along_curve(ids, u)?.1);
+        let along = self.arrays.each(py, f32::NAN, of)?;
+        shaped(py, along, &self.arrays.shape(py))
     }
 
     fn __len__(&self, py: Python<'_>) -> PyResult<usize> {

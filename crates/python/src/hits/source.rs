@@ -13,9 +13,9 @@ use crate::scene::SceneData;
 #[derive(Clone)]
 pub struct Source {
     pub(super) parts: Arc<Parts>,
-    /// The tree where the scene has spheres: only they know their normals.
-    spheres: Option<Arc<SceneData>>,
-    /// Rays of the hits where the scene has spheres, on which ids and weights do not give the place.
+    /// The scene where it has spheres or curves: only its tree knows their normals.
+    others: Option<Arc<SceneData>>,
+    /// Rays of the hits where the scene has spheres or curves, on which ids and weights do not give the place.
     pub(super) rays: Vec<Ray>,
 }
 
@@ -26,13 +26,13 @@ impl Source {
         rays: impl Iterator<Item = Ray>,
         hits: usize,
     ) -> PyResult<Self> {
-        let rays = match scene.has_spheres {
+        let rays = match scene.has_others {
             true => memory::collected(rays, hits, "rays")?,
             false => Vec::new(),
         };
         Ok(Self {
             parts: scene.parts.clone(),
-            spheres: scene.has_spheres.then(|| scene.clone()),
+            others: scene.has_others.then(|| scene.clone()),
             rays,
         })
     }
@@ -81,7 +81,7 @@ impl Source {
             geom_id,
             inst_id,
         };
-        self.spheres.as_ref()?.bvh().normal(ray, &hit)
+        self.others.as_ref()?.bvh().normal(ray, &hit)
     }
 }
 
@@ -101,7 +101,7 @@ impl<'a> Meshes<'a> {
             Part::Mesh {
                 positions, indices, ..
             } => (&positions[..], &indices[..]),
-            Part::Spheres(_) => (&[][..], &[][..]),
+            Part::Spheres(_) | Part::Curves(_) => (&[][..], &[][..]),
         });
         Self {
             meshes: meshes.collect(),
