@@ -256,12 +256,6 @@ pub struct Ids {
 }
 
 impl Ids {
-    pub const NONE: Self = Self {
-        triangle: -1,
-        mesh: -1,
-        instance: -1,
-    };
-
     pub fn of_hit(scene: &SceneData, hit: &Hit) -> Self {
         Self::new(scene, [hit.prim_id, hit.geom_id, hit.inst_id])
     }

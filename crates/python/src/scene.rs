@@ -50,13 +50,6 @@ impl Quality {
         }
     }
 
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Fast => "fast",
-            Self::Default => "default",
-        }
-    }
-
     pub fn recipe(self) -> Recipe {
         let recipe = match self {
             Self::Fast => Recipe::fast(),

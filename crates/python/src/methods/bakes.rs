@@ -1,0 +1,377 @@
+//! Jobs about many points: visibility, open sky, sun.
+
+use antumbra_bake::{AmbientOcclusion, Place, Sunlight};
+use numpy::PyArrayDyn;
+use pyo3::prelude::*;
+
+use super::Queries;
+use crate::bake;
+use crate::bake::Places;
+use crate::bits::BitMatrix;
+use crate::rays::Call;
+use crate::threads::ThreadCount;
+
+#[pymethods]
+#[allow(clippy::too_many_arguments)]
+impl Queries {
+    /// Visibility between points, one bit for each pair.
+    ///
+    /// Points see each other if nothing is strictly between them, as for ``visible``. They are rounded as vertices are. A point that is
+    /// not finite sees nothing. A matrix of 100 000 by 100 000 points takes 1.25 GB: compute parts of ``a`` one after the other.
+    ///
+    /// Parameters
+    /// ----------
+    /// a : array (n, 3)
+    ///     Points.
+    /// b : array (m, 3), optional
+    ///     Without them, ``a`` is compared with itself. The matrix is symmetric then, and its diagonal is false: no point counts
+    ///     as seeing itself.
+    /// margin : float, optional
+    ///     Length that is left out at both ends of a segment, as for ``visible``.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// BitMatrix
+    ///     Of shape (n, m).
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    /// MemoryError
+    ///     There is no memory for the matrix.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> seen = scene.visibility([[0.2, 0.2, 0], [2, 2, 0]], [[0.2, 0.2, 2], [2, 2, 2]])
+    /// >>> seen[0], int(seen.count())
+    /// (array([False,  True]), 3)
+    #[pyo3(signature = (a, b=None, *, margin=None, threads=None, progress=None))]
+    fn visibility<'py>(
+        &self,
+        py: Python<'py>,
+        a: &Bound<'py, PyAny>,
+        b: Option<&Bound<'py, PyAny>>,
+        margin: Option<f32>,
+        threads: Option<ThreadCount>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<BitMatrix> {
+        let data = self.data();
+        let mut call = Call::new(threads, progress)?;
+        bake::visibility(py, &data, a, b, margin, &mut call)
+    }
+
+    /// Which directions points see.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array (..., 3)
+    ///     Points.
+    /// normals : array (..., 3) or None
+    ///     Normals of surfaces, of any length: a direction below the surface is not seen, and rays begin a little above it.
+    ///     With None, points may be in free space or on surfaces, of which both sides count as outside. Rays then begin a
+    ///     little along their direction. Give normals for points on open sheets, such as terrain.
+    /// directions : array (k, 3)
+    ///     Directions of any length, such as those to the sun.
+    /// distance : float
+    ///     Length up to which surfaces are in the way, in units of the scene.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// BitMatrix
+    ///     Of shape (n, k), points in C order.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.sees([[0.2, 0.2, 0]], None, [[0, 0, 1], [1, 0, 0]])[0]
+    /// array([False,  True])
+    #[pyo3(signature = (points, normals, directions, *, distance=f32::INFINITY, threads=None, progress=None))]
+    fn sees<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        normals: Option<&Bound<'py, PyAny>>,
+        directions: &Bound<'py, PyAny>,
+        distance: f32,
+        threads: Option<ThreadCount>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<BitMatrix> {
+        let data = self.data();
+        let places = Places::read(&data, points, normals)?;
+        let mut call = Call::new(threads, progress)?;
+        bake::sees(py, &data, &places, directions, distance, &mut call)
+    }
+
+    /// Open part of the sky above points of surfaces.
+    ///
+    /// Parameters
+    /// ----------
+    /// points, normals : arrays (..., 3)
+    ///     Normals have any length but 0. Values of others are NaN.
+    /// samples : int
+    ///     Rays per point. Powers of two are spread most evenly.
+    /// distance : float
+    ///     Length up to which surfaces are in the way, in units of the scene.
+    /// two_sided : bool
+    ///     Whether the more open side of a point counts, for normals that point anywhere.
+    /// weighting : "cosine" or "uniform"
+    ///     How much each part of the sky counts.
+    /// seed : int
+    ///     Seed of the directions.
+    /// bent : bool
+    ///     Whether to return also the mean open directions.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// array (...) of float32
+    ///     From 0 (closed in) to 1. With ``bent``, a pair of it and the mean open directions: float32 of shape (..., 3).
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.ambient_occlusion([[0.2, 0.2, 2], [5, 5, 0]], [0, 0, 1], 64)
+    /// array([1., 1.], dtype=float32)
+    #[pyo3(signature = (points, normals, samples=256, distance=f32::INFINITY, *, two_sided=false, weighting="cosine", seed=0, bent=false, threads=None, progress=None))]
+    fn ambient_occlusion<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        normals: &Bound<'py, PyAny>,
+        samples: u32,
+        distance: f32,
+        two_sided: bool,
+        weighting: &str,
+        seed: u64,
+        bent: bool,
+        threads: Option<ThreadCount>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let data = self.data();
+        let places = Places::read(&data, points, Some(normals))?;
+        let options = AmbientOcclusion {
+            samples,
+            distance,
+            two_sided,
+            weighting: bake::weighting(weighting)?,
+            seed,
+        };
+        let mut call = Call::new(threads, progress)?;
+        let (open, bent) = bake::ambient_occlusion(py, &data, &places, &options, bent, &mut call)?;
+        match bent {
+            None => Ok(open.into_any()),
+            Some(bent) => Ok((open, bent).into_pyobject(py)?.into_any()),
+        }
+    }
+
+    /// Part of the sky that points see, by its patches.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array (..., 3)
+    ///     Points.
+    /// normals : array (..., 3), optional
+    ///     Normals of surfaces, as for ``sees``. Without them, the sky is weighted for a level surface.
+    /// patches, uniform, up, north
+    ///     The sky, as for ``sky_patches``.
+    /// weighting : "cosine" or "uniform"
+    ///     "cosine" is the light that a surface receives from an even sky, relative to a level and free one. "uniform" is the
+    ///     solid angle.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// array (...) of float32
+    ///     From 0 to 1, in the shape of the points.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.sky_view([[5, 5, 2]])
+    /// array([1.], dtype=float32)
+    #[pyo3(signature = (points, normals=None, patches=145, *, uniform=false, weighting="cosine", up="z", north=0.0, threads=None, progress=None))]
+    fn sky_view<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        normals: Option<&Bound<'py, PyAny>>,
+        patches: u32,
+        uniform: bool,
+        weighting: &str,
+        up: &str,
+        north: f64,
+        threads: Option<ThreadCount>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
+        let data = self.data();
+        let places = Places::read(&data, points, normals)?;
+        let (sky, orientation) = (bake::sky(patches, uniform)?, bake::orientation(up, north)?);
+        let weighting = bake::weighting(weighting)?;
+        let mut call = Call::new(threads, progress)?;
+        let sky = (&sky, &orientation);
+        bake::sky_view(py, &data, &places, sky, weighting, &mut call)
+    }
+
+    /// Hours of direct sun of points.
+    ///
+    /// Parameters
+    /// ----------
+    /// points : array (..., 3)
+    ///     Points.
+    /// normals : array (..., 3) or None
+    ///     As for ``sees``.
+    /// sun_directions : array (k, 3)
+    ///     Directions to the sun above the horizon, one for each step of time: see ``sun_positions``.
+    /// weights : float or array (k,), optional
+    ///     Length of each step in hours, or whatever else is to be added up: 1.
+    /// threads : int, optional
+    ///     Number of threads; see ``set_threads``.
+    /// progress : optional
+    ///     Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+    ///
+    /// Returns
+    /// -------
+    /// array (...) of float64
+    ///     In the shape of the points.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError, TypeError
+    ///     An argument has another shape or type, or shapes do not fit.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    /// >>> scene.sun_hours([[0.2, 0.2, 0], [5, 5, 0]], None, [[0, 0, 1], [0, 1, 1]], weights=0.5)
+    /// array([0.5, 1. ])
+    #[pyo3(signature = (points, normals, sun_directions, weights=None, *, threads=None, progress=None))]
+    fn sun_hours<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        normals: Option<&Bound<'py, PyAny>>,
+        sun_directions: &Bound<'py, PyAny>,
+        weights: Option<&Bound<'py, PyAny>>,
+        threads: Option<ThreadCount>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let data = self.data();
+        let places = Places::read(&data, points, normals)?;
+        let mut call = Call::new(threads, progress)?;
+        let one = 1.0f64.into_pyobject(py)?.into_any();
+        let weights = weights.unwrap_or(&one);
+        bake::sun_hours(py, &data, &places, sun_directions, weights, &mut call)
+    }
+
+    /// Irradiation of points by the sun and by the sky: see ``antumbra.irradiation``.
+    #[pyo3(name = "_irradiation")]
+    fn irradiation<'py>(
+        &self,
+        py: Python<'py>,
+        points: &Bound<'py, PyAny>,
+        normals: Option<&Bound<'py, PyAny>>,
+        place: (f64, f64, f64),
+        times: Vec<f64>,
+        steps: [Bound<'py, PyAny>; 3],
+        sky: (u32, bool, String, f64),
+        threads: Option<ThreadCount>,
+        progress: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<bake::Irradiation<'py>> {
+        let data = self.data();
+        let places = Places::read(&data, points, normals)?;
+        let (latitude, longitude, height) = place;
+        let place = Place {
+            latitude,
+            longitude,
+            height,
+        };
+        let [hours, direct_normal, diffuse_horizontal] = &steps;
+        let steps = bake::time_steps(&times, hours, direct_normal, diffuse_horizontal)?;
+        let (patches, uniform, up, north) = sky;
+        let (sky, orientation) = (bake::sky(patches, uniform)?, bake::orientation(&up, north)?);
+        let sunlight = Sunlight::new(&place, steps, true, sky, orientation);
+        let sunlight = sunlight.map_err(bake::failed)?;
+        let mut call = Call::new(threads, progress)?;
+        bake::irradiation(py, &data, &places, &sunlight, &mut call)
+    }
+
+    /// Points on the surfaces that are seen from above, in the middle of square cells over the bounds of the scene.
+    ///
+    /// Parameters
+    /// ----------
+    /// spacing : float
+    ///     Side of a cell, in units of the scene.
+    /// up : "z" or "y"
+    ///     Axis that points up, as for ``sky_patches``.
+    ///
+    /// Returns
+    /// -------
+    /// points : float64 of shape (k, 3)
+    ///     Uppermost points, row by row from north to south.
+    /// normals : float32 of shape (k, 3)
+    ///     Normals of the surfaces there, turned upwards.
+    /// cells : int64 of shape (rows, columns)
+    ///     Number of the point of each cell, -1 where no surface is.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     The spacing is not above 0, makes more than 100 million cells, or no surface is seen from above.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import antumbra as am
+    /// >>> scene = am.Scene([[0, 0, 1], [2, 0, 1], [0, 3, 1]], [[0, 1, 2]])
+    /// >>> points, normals, cells = scene.sensor_grid(1.0)
+    /// >>> cells
+    /// array([[-1, -1],
+    ///        [ 0, -1],
+    ///        [ 1,  2]])
+    #[pyo3(signature = (spacing, *, up="z"))]
+    fn sensor_grid<'py>(
+        &self,
+        py: Python<'py>,
+        spacing: f64,
+        up: &str,
+    ) -> PyResult<bake::Cells<'py>> {
+        let data = self.data();
+        let orientation = bake::orientation(up, 0.0)?;
+        bake::sensor_grid(py, &data, spacing, &orientation)
+    }
+}
