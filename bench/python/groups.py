@@ -69,7 +69,7 @@ def main():
     print("|---|---|---|---|---|---|")
     for name in ("city", "hills"):
         for kind, directions in [
-            ("4 suns", suns(4)), ("16 suns", suns(16)), ("sky of 145", am.sky_patches(145)[0].astype(np.float32)), ("2000 suns", suns(2000)),
+            ("32 suns", suns(32)), ("64 suns", suns(64)), ("sky of 145", am.sky_patches(145)[0].astype(np.float32)), ("2000 suns", suns(2000)),
         ]:
             measure(name, kind, directions, arguments)
 

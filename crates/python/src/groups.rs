@@ -1,13 +1,13 @@
 //! Rays from every point in every direction of a call, as the kernel's groups: no ray is made before it is traced.
 //!
-//! # Why the answers are those of closed rays
+//! # Why the answers equal the answers of closed rays
 //!
 //! Intervals of Python are closed, and a group takes intervals that begin at 0 or later. A closed interval from 0 is the open
 //! interval from 0 and what is at 0: the kernel's closed ray begins at the largest negative number that is not subnormal.
 //! So a ray that is open in the group is traced once more, from there to the smallest positive number, if anything can be hit so
 //! near to its point. Set-up of rays in the kernel bounds how near: at its distance `t`, a ray is off a point of the triangle
 //! that it hits by at most `11 u R` on each axis. That is less than the origin offset, so points without a surface within the
-//! origin offset need no second look. It holds for triangles that stand in the world, where `t` does not depend on the interval.
+//! origin offset need no second look. It holds for triangles that no instance places, where `t` does not depend on the interval.
 
 use antumbra::{Aabb, Directions, Distance, Ray};
 use antumbra_bake::along_curve;
@@ -27,8 +27,8 @@ const RAYS: (usize, usize) = (1 << 14, 1 << 20);
 /// Most points of a thread at a time, however few directions there are.
 const MOST_POINTS: usize = 1 << 12;
 
-/// Fewer directions than this do not pay.
-pub const FEW_DIRECTIONS: usize = 4;
+/// Fewer directions than this do not pay, as measured by bench/python/groups.py.
+pub const FEW_DIRECTIONS: usize = 32;
 
 /// Points, and the directions in which each has a ray.
 pub struct RayGroup {
@@ -73,9 +73,9 @@ impl RayGroup {
         answers: &mut [bool],
         call: &mut Call<'_>,
     ) -> PyResult<()> {
-        let order = py
-            .detach(|| along_curve(&self.points))
-            .map_err(crate::bake::failed)?;
+        let threads = call.threads.clone();
+        let order = py.detach(|| threads.run(|| along_curve(&self.points)));
+        let order = order.map_err(crate::bake::failed)?;
         let points = order.iter().map(|&place| self.points[place as usize]);
         let points = memory::collected(points, order.len(), "points")?;
         let directions = Directions::new(&self.directions);
@@ -91,10 +91,8 @@ impl RayGroup {
                     let bits = self.open(scene, points, &directions)?;
                     Ok(Open { first, bits })
                 };
-                let found: PyResult<Vec<Open>> = match threads.count() {
-                    1 => points.chunks(block).enumerate().map(of).collect(),
-                    _ => threads.run(|| points.par_chunks(block).enumerate().map(of).collect()),
-                };
+                let blocks = points.par_chunks(block).enumerate();
+                let found: PyResult<Vec<Open>> = threads.run(|| blocks.map(of).collect());
                 for open in found? {
                     self.write(&order[open.first..], &open.bits, answers);
                 }
@@ -131,11 +129,11 @@ impl RayGroup {
         open: &mut [u64],
     ) -> PyResult<()> {
         let (bvh, bounds) = (scene.bvh(), scene.bvh().bounds());
-        // As far as rays of these directions come before the smallest number.
+        // And as far as rays of these directions come within the smallest number.
         let sizes = self.directions.as_flattened().iter().map(|x| x.abs());
         let most = sizes.filter(|size| size.is_finite()).fold(0.0, f32::max);
         let limit = |point: &[f32; 3]| {
-            bounds.union(&Aabb::around(&[*point])).origin_offset() + most * f32::MIN_POSITIVE
+            bounds.union(&Aabb::around(&[*point])).origin_offset() + 2.0 * most * f32::MIN_POSITIVE
         };
         let limits = memory::collected(points.iter().map(limit), points.len(), "distances")?;
         let mut near = memory::filled(None, points.len(), "answers")?;

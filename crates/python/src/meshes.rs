@@ -97,7 +97,7 @@ pub fn read<'py>(
     Ok(parts)
 }
 
-/// Placements of meshes alone, and paths to them if there are assemblies: places in the lists from the world inwards.
+/// Placements of meshes only, and paths to them if there are assemblies: places in the lists from the world inwards.
 fn flat(
     items: &[Item<'_>],
     placements: Vec<Placement>,

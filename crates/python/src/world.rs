@@ -308,7 +308,8 @@ impl World {
     /// Learns the order of the tree again, for these rays in the world as it is now.
     ///
     /// Answers stay the same bits. A copy of the world learns: the lock of the interpreter is released, other threads may query and move
-    /// the world meanwhile, and the order takes effect at the end. The order is kept when instances move.
+    /// the world meanwhile, and the order takes effect at the end. The order is kept when instances move. The example learns beside the frames,
+    /// on a thread of its own.
     ///
     /// Parameters
     /// ----------
@@ -334,8 +335,6 @@ impl World {
     ///
     /// Examples
     /// --------
-    /// Learning beside the frames, by a thread of its own:
-    ///
     /// >>> import antumbra as am
     /// >>> import numpy as np
     /// >>> from concurrent.futures import ThreadPoolExecutor
@@ -389,6 +388,11 @@ impl World {
     /// ----------
     /// order : ChildOrder
     ///     What ``relearn`` returned.
+    ///
+    /// Raises
+    /// ------
+    /// TypeError
+    ///     The order is no ``ChildOrder``.
     ///
     /// Examples
     /// --------

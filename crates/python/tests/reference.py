@@ -12,7 +12,7 @@ import antumbra.trimesh
 PAGE = pathlib.Path(__file__).parents[3] / "docs" / "src" / "python" / "reference.md"
 
 PARTS = [
-    ("Scenes", antumbra, ["Scene", "World", "Queries", "Mesh", "Instance"]),
+    ("Scenes", antumbra, ["Scene", "World", "Queries", "Mesh", "Curves", "Instance", "Assembly", "ChildOrder"]),
     ("Results", antumbra, ["Hits", "HitList", "Closest", "Occluders", "BitMatrix", "SunPositions", "Irradiation", "Map", "Picture"]),
     ("Functions", antumbra, ["sun_positions", "irradiation", "sky_patches", "texel_atlas", "heat_map", "render", "set_threads", "get_threads"]),
     ("Warnings", antumbra, ["DegenerateWarning"]),

@@ -49,7 +49,7 @@ def test_the_reference_is_what_the_docstrings_say():
 
 
 MODULES = [am, antumbra.open3d, antumbra.trimesh, antumbra.embreex, antumbra.embreex.rtcore, antumbra.embreex.rtcore_scene, antumbra.embreex.mesh_construction]
-RETURN_NOTHING = {"save", "set_masks", "set_instances", "refit", "relearn", "set_threads", "install"}
+RETURN_NOTHING = {"save", "set_masks", "set_instances", "refit", "adopt", "set_threads", "install"}
 RAISE_NOTHING = {"antumbra.embreex.install"}
 
 
@@ -116,7 +116,7 @@ def test_examples_of_docstrings_are_true(name, thing):
     assert not runner.failures
 
 
-@pytest.mark.parametrize("name", ["vertices", "faces", "normals"])
+@pytest.mark.parametrize("name", ["vertices", "faces", "normals", "paths"])
 def test_examples_of_properties_are_true(name):
     runner = doctest.DocTestRunner()
     runner.run(doctest.DocTestParser().get_doctest(getattr(am.Queries, name).__doc__, {}, name, None, 0))

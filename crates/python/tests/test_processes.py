@@ -262,3 +262,32 @@ def test_ctrl_c_ends_long_work(work):
         child.kill()
     assert out == "interrupted\n"
     assert child.returncode == 0
+
+
+def test_cells_of_a_raster_may_be_cut_into_any_blocks_and_the_terrain_may_not():
+    da = pytest.importorskip("dask.array")
+    rng = np.random.default_rng(12)
+    x, y = np.meshgrid(np.arange(70), np.arange(50))
+    heights = 6 * np.sin(x / 6) * np.cos(y / 5) + rng.uniform(0, 2, x.shape)
+    transform = (5.0, 0, 4_500_000, 0, -5.0, 5_400_000)
+    terrain = am.Scene.from_heights(heights, transform)
+    cells, normals = terrain.vertices.reshape(50, 70, 3), terrain.normals.reshape(50, 70, 3)
+    suns, eye = rng.normal(size=(40, 3)) * [1, 1, 0.2] + [0, 0, 0.4], terrain.bounds.mean(0) + [0, 0, 20]
+    jobs = {
+        "sky": lambda at, up: terrain.sky_view(at, up, threads=1),
+        "suns": lambda at, up: terrain.sun_hours(at, up, suns, threads=1),
+        "ao": lambda at, up: terrain.ambient_occlusion(at, up, 64, threads=1),
+        "shade": lambda at, up: terrain.occluded(at + [0, 0, 0.01], suns[0], threads=1),
+        "group": lambda at, up: terrain.occluded((at + [0, 0, 0.01])[:, :, None], suns, threads=1).sum(2),
+        "seen": lambda at, up: terrain.visible(at + [0, 0, 1], eye, threads=1),
+    }
+    whole = {name: job(cells, normals) for name, job in jobs.items()}
+    for chunks in [(50, 70, 3), (16, 23, 3), (1, 70, 3)]:
+        blocks = [da.from_array(each, chunks=chunks) for each in (cells, normals)]
+        for name, job in jobs.items():
+            found = da.map_blocks(job, *blocks, drop_axis=2, dtype=whole[name].dtype, meta=np.array((), whole[name].dtype))
+            np.testing.assert_array_equal(found.compute(scheduler="threads"), whole[name], err_msg=name)
+    # A part of the terrain with a rim of ten cells around the cells in question.
+    part = am.Scene.from_heights(heights[:30, :30], transform)
+    cut = part.sky_view(*(each.reshape(30, 30, 3)[:20, :20] for each in (part.vertices, part.normals)))
+    assert (cut != whole["sky"][:20, :20]).any()

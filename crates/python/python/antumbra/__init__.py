@@ -55,10 +55,24 @@ class Mesh(NamedTuple):
 class Curves(NamedTuple):
     """Thin curves, such as hairs, grass and wires: one item in the list of meshes of a scene.
 
-    Curves are flat and face every ray: a ray hits what is within the radius of the axis. Straight segments stand for cubic curves, and are no
-    farther from them than a tenth of the largest radius. Inner points join segments without a gap. Both ends are cut off flat.
+    Curves are flat and face every ray: a ray hits what is within the radius of the axis. Inner points join segments without a gap, and
+    both ends are cut off flat. Straight segments stand for cubic curves, and are no farther from them than a tenth of the largest radius.
 
-    A hit has the number of the segment in ``triangle``, the number of the curve in ``curve`` and the parameter in ``along``.
+    A hit has the number of the segment in ``triangle``, the number of the curve in ``curve`` and the parameter in ``along``. The
+    nearest point of a curve is on its axis. Segments with a number that is not finite, with two equal ends or without a radius are left
+    out, with a ``DegenerateWarning``.
+
+    Parameters
+    ----------
+    points : array (n, 3) or (..., n, 3)
+        Points of one curve, or of many curves of n points each. With ``counts``, (n, 3) of all curves one after the other.
+    radii : number or array
+        Radii of the points, broadcast to the shape of the points without its last axis: at least 0.
+    kind : "linear", "bezier", "bspline" or "catmull-rom"
+        Linear curves have at least 2 points. The others are cubic: Bezier curves have 4, 7, 10, ... points, of which
+        each third one ends a piece. B-splines and Catmull-Rom splines have at least 4.
+    counts : array (k,) of integers, optional
+        Number of points of each curve.
 
     Examples
     --------
@@ -102,7 +116,12 @@ class Assembly(NamedTuple):
     """Instances that are placed together: one item in the list of meshes of a ``Scene``, for instances of instances to any depth.
 
     Each path from the scene to a mesh is an instance of its own: ``hits.instance`` is its number, and ``scene.paths[hits.instance]``
-    the way to it.
+    the way to it. Some assembly or instance has to place each assembly. Masks of assemblies count for nothing.
+
+    Parameters
+    ----------
+    instances : sequence of Instance or of (mesh, transform)
+        Placements inside of the assembly. A mesh is a place in the list of meshes of the scene, and may be another assembly.
 
     Examples
     --------
@@ -120,7 +139,7 @@ class Assembly(NamedTuple):
     """
 
     instances: Any
-    """Sequence of ``Instance`` or of (mesh, transform): places in the list of meshes of the scene, also of other assemblies."""
+    """Sequence of ``Instance`` or of (mesh, transform), whose mesh is a place in the list of the scene."""
 
 
 class Occluders(NamedTuple):

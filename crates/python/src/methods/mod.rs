@@ -40,12 +40,12 @@ impl From<Arc<SceneData>> for Queries {
 }
 
 impl Queries {
-    /// What is asked, as it is now. Whoever moves it meanwhile moves a copy.
+    /// The scene as it is now. Whoever moves it meanwhile moves a copy.
     pub fn data(&self) -> Arc<SceneData> {
         self.held().clone()
     }
 
-    /// Changes what is asked. Calls that are running go on with what they have.
+    /// Changes the scene. Calls that are running go on with what they have.
     pub fn change<T>(&self, change: impl FnOnce(&mut SceneData) -> T) -> T {
         change(Arc::make_mut(&mut self.held()))
     }

@@ -72,7 +72,7 @@ impl Queries {
         data.local().origin.into()
     }
 
-    /// How each instance is reached: int64 of shape (instances, depth), places in the list of instances of the scene, then in those of the
+    /// How each instance is reached: int64 of shape (instances, depth), places in the list of instances of the scene, then in the list of the
     /// ``Assembly`` that is placed there, and so on. -1 behind the last place.
     ///
     /// Examples

@@ -493,7 +493,7 @@ impl Queries {
     }
 }
 
-/// What tells where hits lie.
+/// Data from which places of hits are computed.
 fn source(data: &Arc<SceneData>, rays: &impl RaySource) -> PyResult<Source> {
     let all = (0..rays.len()).map(|place| rays.get(place));
     Source::new(data, all, rays.len())
