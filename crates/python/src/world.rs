@@ -541,7 +541,7 @@ fn rows(
             bake::each(&numbers, instances)?
         }
         None if before.len() == instances => before.iter().map(|&object| object.into()).collect(),
-        None if count == 1 || instances == 0 => vec![0.0; instances],
+        None if count == 1 || instances == 0 => memory::filled(0.0, instances, "instances")?,
         None => {
             return Err(PyValueError::new_err(format!(
                 "objects: found none, wanted which of {count} meshes each of {instances} instances places"

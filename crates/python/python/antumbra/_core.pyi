@@ -30,6 +30,7 @@ _Exclude = _Ids | ArrayLike
 
 __all__ = [
     "BitMatrix",
+    "ChildOrder",
     "Closest",
     "DegenerateWarning",
     "HitList",
