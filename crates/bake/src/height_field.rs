@@ -197,6 +197,39 @@ impl<'a> HeightField<'a> {
         }
     }
 
+    /// Height of a cell; `None` without data, or beside the field. Column and row are whole numbers.
+    pub(crate) fn height_at(&self, [column, row]: [f64; 2]) -> Option<f64> {
+        let is_inside = |at: f64, side: usize| at >= 0.0 && at < side as f64;
+        if !is_inside(column, self.width) || !is_inside(row, self.height) {
+            return None;
+        }
+        let height = self.rows[row as usize * self.width + column as usize];
+        height.is_finite().then_some(height)
+    }
+
+    /// Whether an edge of a triangle is between two cells with data, which are neighbours or at two corners of a square.
+    pub(crate) fn has_edge(&self, [c, r]: [f64; 2], [c2, r2]: [f64; 2]) -> bool {
+        let has = |column: f64, row: f64| self.height_at([column, row]).is_some();
+        let beside = (has(c2, r), has(c, r2));
+        match (c != c2, r != r2) {
+            (true, true) if (c < c2) == (r < r2) => beside.0 || beside.1,
+            (true, true) => beside.0 != beside.1,
+            _ => {
+                let cell = |column: f64, row: f64| row as u32 * self.width as u32 + column as u32;
+                let mut wire = [cell(c, r), cell(c2, r2)];
+                wire.sort_unstable();
+                !self.wires.contains(&wire)
+            }
+        }
+    }
+
+    /// Whether a cell with data is the corner of a triangle.
+    pub(crate) fn has_triangle(&self, [c, r]: [f64; 2]) -> bool {
+        let beside = [[c - 1.0, r], [c + 1.0, r], [c, r - 1.0], [c, r + 1.0]];
+        let mut beside = beside.into_iter();
+        beside.any(|other| self.height_at(other).is_some() && self.has_edge([c, r], other))
+    }
+
     /// The field as it looks from a cell: along columns or rows, forwards or backwards.
     pub(crate) fn view(&self, side: Side, [column, row]: [f64; 2]) -> View<'_> {
         let [_, a, b, _, d, e] = self.transform;

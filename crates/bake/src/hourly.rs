@@ -70,6 +70,11 @@ impl<'a> Hourly<'a> {
         self.sunlight.timeline()[step].0.begin
     }
 
+    /// Number of the sun of a step among the [suns](Sunlight::suns); `None` if none is above the horizon.
+    pub fn sun(&self, step: usize) -> Option<usize> {
+        self.steps[step].0
+    }
+
     /// Beginning of a step in Unix time.
     pub fn unix(&self, step: usize) -> f64 {
         let step = &self.sunlight.timeline()[step].0;

@@ -25,8 +25,9 @@
 //! | where does the sun stand | [`sun_positions`], [`Orientation::direction`] | angles, a direction in the scene |
 //! | which suns does each point see, and for how long | [`sees_directions`], [`sun_hours`] | [`BitMatrix`], points x suns; `f64` |
 //! | how much energy does each point receive from the sun and the sky | [`SunJob`], [`run`] | [`SunValues`] |
-//! | how much of the light of a surface arrives at others | [`view_factors`] | `f64`, surfaces x surfaces |
+//! | how much of the light of a surface arrives at others | [`view_factors`], [`ViewFactorJob`] | `f64`, surfaces x surfaces |
 //! | which cells of a height raster does each observer see | [`ViewshedJob`], [`run`] | [`Viewsheds`] |
+//! | how high is the horizon in each azimuth | [`HorizonJob`], [`FieldHorizonJob`], [`run`] | `f32`, points x azimuths |
 //! | which points see each other | [`sees_points`], [`sees_each_other`] | [`BitMatrix`], points x points |
 //!
 //! All of them take slices of `[f32; 3]` in the coordinates of the tree, and a [`Monitor`], which hears of the progress and may
@@ -59,7 +60,8 @@
 //!
 //! # Jobs
 //!
-//! Long bakes are jobs: [`OcclusionJob`], [`SunJob`], [`VisibilityJob`] and [`ViewshedJob`]. A [`Job`] has numbered items, and
+//! Long bakes are jobs: [`OcclusionJob`], [`SunJob`], [`HorizonJob`], [`FieldHorizonJob`], [`ViewFactorJob`], [`VisibilityJob`] and
+//! [`ViewshedJob`]. A [`Job`] has numbered items, and
 //! [`Work`] computes them in chunks, which can be kept in files, resumed, and shared among machines. [`learn_when_it_pays`] makes
 //! a tree that learned from rays of the job. [`Sensors`] and [`Atlas`] make points of meshes, grids, tables and textures.
 //!
@@ -67,11 +69,13 @@
 //! - `job`: jobs and their keys;  `work`, `part`: chunks of a job, and files of them;  `learn`: trees that learn from a job
 //! - `occlusion_job`, `sunlight`, `visibility_job`: one job each
 //! - `mesh`, `sensors`, `table`, `atlas`: points that are baked
+//! - `groups`: triangles of an object, a material or a facade, and means over their sensors
 //! - `placement`: sensors on roofs, facades and ground, and along lines
 //! - `ambient_occlusion`: the open part of the sky above points
 //! - `view_factors`: light that goes from surface to surface
 //! - `curvature`: lines of sight over a round earth
 //! - `viewshed`: cells of a `height_field` that observers see;  `sweep`, `horizon`: edges of the field as an eye sees them
+//! - `horizon_angles`: how high surfaces reach in each azimuth, by rays;  `field_horizon`: the same of height fields, exactly
 //! - `visibility`: directions and points that points see;  `exposure`: sums of what they see
 //! - `sky`: the sky in patches;  `sun`: where the sun stands;  `moment`, `clock`: dates, times of day and time zones
 //! - `hourly`: values step by step;  `measures`: classes of sunlight, reflected light
@@ -95,9 +99,12 @@ mod directions;
 mod epw;
 mod error;
 mod exposure;
+mod field_horizon;
 mod glb;
+mod groups;
 mod height_field;
 mod horizon;
+mod horizon_angles;
 mod hourly;
 mod job;
 mod learn;
@@ -139,8 +146,11 @@ pub use directions::Weighting;
 pub use epw::{BadWeather, Record, Weather};
 pub use error::Error;
 pub use exposure::{sky_view, sun_hours};
+pub use field_horizon::FieldHorizonJob;
 pub use glb::write_glb;
+pub use groups::{Groups, Statistics};
 pub use height_field::HeightField;
+pub use horizon_angles::HorizonJob;
 pub use hourly::{Hourly, Receipt};
 pub use job::{Job, Key, run};
 pub use learn::{Learned, learn_when_it_pays};
@@ -161,7 +171,7 @@ pub use sky::{SkyDivision, SkyPatches};
 pub use sun::{Place, Refraction, SunPosition, sun_positions};
 pub use sunlight::{SunFound, SunJob, SunValues, Sunlight, Suns, TimeStep};
 pub use table::BadTable;
-pub use view_factors::view_factors;
+pub use view_factors::{ViewFactorJob, view_factors};
 pub use viewshed::{Observer, ViewshedJob, Viewsheds};
 pub use visibility::{SightLines, SightRange, sees_directions, sees_each_other, sees_points};
 pub use visibility_job::{Eyes, VisibilityJob};

@@ -33,6 +33,29 @@ impl Surface {
             Self::Underside => "underside",
         }
     }
+
+    /// Kind of the surface at a point with a normal of length 1.
+    pub(crate) fn of(
+        bvh: &Bvh,
+        point: [f64; 3],
+        normal: [f64; 3],
+        orientation: &Orientation,
+    ) -> Self {
+        let steepness = dot(normal, orientation.up);
+        if steepness.abs() < STEEP {
+            return Self::Facade;
+        }
+        if steepness < 0.0 {
+            return Self::Underside;
+        }
+        let below = normal.map(|x| -x);
+        let start = above(&bvh.bounds(), &point.map(|x| x as f32), below);
+        let down = normal.map(|x| -x as f32);
+        match bvh.occluded(&Ray::new(start, down)) {
+            true => Self::Roof,
+            false => Self::Ground,
+        }
+    }
 }
 
 /// How sensors are placed on surfaces.
@@ -98,7 +121,7 @@ impl Sensors {
             plane.lattice(corners, placement.spacing, &mut found)?;
             memory::grow(&mut sensors.points, "sensors", found.len())?;
             for &point in &found {
-                let kind = plane.kind(bvh, point);
+                let kind = Surface::of(bvh, point, plane.normal, orientation);
                 if !placement.kinds.contains(&kind) {
                     continue;
                 }
@@ -191,8 +214,6 @@ impl Sensors {
 struct Plane {
     normal: [f64; 3],
     axes: [[f64; 3]; 2],
-    /// Part of the normal that points up.
-    steepness: f64,
 }
 
 impl Plane {
@@ -210,24 +231,7 @@ impl Plane {
         Some(Self {
             normal,
             axes: [right, other],
-            steepness: dot(normal, orientation.up),
         })
-    }
-
-    fn kind(&self, bvh: &Bvh, point: [f64; 3]) -> Surface {
-        if self.steepness.abs() < STEEP {
-            return Surface::Facade;
-        }
-        if self.steepness < 0.0 {
-            return Surface::Underside;
-        }
-        let below = self.normal.map(|x| -x);
-        let start = above(&bvh.bounds(), &point.map(|x| x as f32), below);
-        let down = self.normal.map(|x| -x as f32);
-        match bvh.occluded(&Ray::new(start, down)) {
-            true => Surface::Roof,
-            false => Surface::Ground,
-        }
     }
 
     /// Points of the lattice inside of a triangle of the plane. Of two triangles with a common edge, one has its points.

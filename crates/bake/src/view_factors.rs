@@ -1,11 +1,14 @@
 //! View factors between surfaces.
 
+use std::ops::Range;
+
 use antumbra::{Bvh, Ray};
 use rayon::prelude::*;
 
+use crate::job::{bytes_of, words_of};
 use crate::normals::{cross, unit};
 use crate::visibility::above;
-use crate::{Error, Monitor};
+use crate::{Error, Job, Key, Monitor, memory, run};
 
 /// Rays that a thread traces together.
 const RAYS: usize = 1 << 12;
@@ -33,45 +36,121 @@ pub fn view_factors(
     samples: u32,
     monitor: &dyn Monitor,
 ) -> Result<Vec<f64>, Error> {
-    if samples == 0 {
-        return Err(Error::NoSamples);
-    }
-    let mut of_prim = Vec::new();
-    for (index, triangles) in surfaces.iter().enumerate() {
-        of_prim.extend(std::iter::repeat_n(index, triangles.len()));
-    }
-    let width = surfaces.len() + 1;
-    let mut factors = vec![0.0; surfaces.len() * width];
-    for (row, triangles) in factors.chunks_mut(width).zip(surfaces) {
-        if monitor.cancelled() {
-            return Err(Error::Cancelled);
+    run(&ViewFactorJob::new(surfaces, samples)?, bvh, monitor)
+}
+
+/// Job of [`view_factors`]: an item is a surface, and has a row.
+pub struct ViewFactorJob<'a> {
+    surfaces: &'a [Vec<[[f32; 3]; 3]>],
+    samples: u32,
+    /// Surface of each triangle.
+    of_prim: Vec<u32>,
+}
+
+/// Count in the rows of surfaces without area.
+const NOTHING: u64 = u64::MAX;
+
+impl<'a> ViewFactorJob<'a> {
+    /// The job of these surfaces, with so many rays from each.
+    ///
+    /// # Errors
+    /// [`Error::NoSamples`], [`Error::NoMemory`].
+    pub fn new(surfaces: &'a [Vec<[[f32; 3]; 3]>], samples: u32) -> Result<Self, Error> {
+        if samples == 0 {
+            return Err(Error::NoSamples);
         }
-        let Some(emitter) = Emitter::new(bvh, triangles) else {
-            row.fill(f64::NAN);
-            continue;
+        let triangles = surfaces.iter().map(Vec::len).sum();
+        let mut of_prim = memory::room("triangles", triangles)?;
+        for (index, triangles) in (0..).zip(surfaces) {
+            of_prim.extend(std::iter::repeat_n(index, triangles.len()));
+        }
+        Ok(Self {
+            surfaces,
+            samples,
+            of_prim,
+        })
+    }
+
+    /// Numbers of a row.
+    fn width(&self) -> usize {
+        self.surfaces.len() + 1
+    }
+
+    /// Rays of a surface that arrive at each other one, and those that arrive nowhere.
+    fn counts(&self, bvh: &Bvh, surface: usize) -> Vec<u64> {
+        let (width, samples) = (self.width(), self.samples as usize);
+        let Some(emitter) = Emitter::new(bvh, &self.surfaces[surface]) else {
+            return vec![NOTHING; width];
         };
-        let firsts: Vec<usize> = (0..samples as usize).step_by(RAYS).collect();
+        let firsts: Vec<usize> = (0..samples).step_by(RAYS).collect();
         let counts = firsts.par_iter().map(|&first| {
-            let last = (first + RAYS).min(samples as usize);
+            let last = (first + RAYS).min(samples);
             let rays: Vec<Ray> = (first..last).map(|index| emitter.ray(index)).collect();
             let mut hits = vec![None; rays.len()];
             bvh.intersect_batch(&rays, &mut hits);
             let mut counts = vec![0_u64; width];
             for hit in hits {
-                let surface = hit.and_then(|hit| of_prim.get(hit.prim_id as usize));
-                counts[surface.copied().unwrap_or(width - 1)] += 1;
+                let surface = hit.and_then(|hit| self.of_prim.get(hit.prim_id as usize));
+                counts[surface.map_or(width - 1, |&surface| surface as usize)] += 1;
             }
             counts
         });
-        let counts = counts.reduce(
+        counts.reduce(
             || vec![0; width],
             |a, b| a.iter().zip(&b).map(|(a, b)| a + b).collect(),
-        );
-        for (factor, count) in row.iter_mut().zip(counts) {
-            *factor = count as f64 / f64::from(samples);
+        )
+    }
+}
+
+impl Job for ViewFactorJob<'_> {
+    type Found = Vec<f64>;
+
+    const NAME: &'static str = "view-factors/1";
+
+    fn items(&self) -> usize {
+        self.surfaces.len()
+    }
+
+    fn rays_per_item(&self) -> u64 {
+        self.samples.into()
+    }
+
+    fn identify(&self, key: &mut Key) {
+        key.text(&format!("{}", self.samples));
+        for triangles in self.surfaces {
+            key.vectors(triangles.as_flattened());
         }
     }
-    Ok(factors)
+
+    fn answers(
+        &self,
+        bvh: &Bvh,
+        items: Range<usize>,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<u8>, Error> {
+        let total = items.len();
+        let mut words = memory::room("view factors", total * self.width())?;
+        for (done, surface) in items.enumerate() {
+            if monitor.cancelled() {
+                return Err(Error::Cancelled);
+            }
+            words.extend(self.counts(bvh, surface));
+            monitor.progress(done + 1, total);
+        }
+        bytes_of(&words)
+    }
+
+    fn finish(&self, answers: &[Vec<u8>]) -> Result<Vec<f64>, Error> {
+        let words = words_of(answers)?;
+        if words.len() != self.surfaces.len() * self.width() {
+            return Err(Error::Answers);
+        }
+        let factor = |count: u64| match count {
+            NOTHING => f64::NAN,
+            _ => count as f64 / f64::from(self.samples),
+        };
+        Ok(words.into_iter().map(factor).collect())
+    }
 }
 
 /// A surface that emits.
@@ -234,7 +313,10 @@ mod tests {
             );
         }
         for row in found.chunks(7) {
-            assert!((row.iter().sum::<f64>() - 1.0).abs() < 1e-12);
+            assert!(
+                (row.iter().sum::<f64>() - 1.0).abs() < 1e-12,
+                "the sum rule"
+            );
             assert!(row[6] < 1e-5, "rays leave a closed box: {row:?}");
         }
     }

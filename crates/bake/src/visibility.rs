@@ -219,7 +219,7 @@ fn ray_direction(dir: [f32; 3], has_lengths: bool) -> [f32; 3] {
 }
 
 /// [Origin offset](Aabb::origin_offset) of a point in a scene with these bounds.
-fn origin_offset(bounds: &Aabb, point: [f32; 3]) -> f32 {
+pub(crate) fn origin_offset(bounds: &Aabb, point: [f32; 3]) -> f32 {
     bounds.union(&Aabb::around(&[point])).origin_offset()
 }
 

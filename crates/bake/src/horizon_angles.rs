@@ -1,0 +1,324 @@
+//! Horizon angles: how high surfaces reach in each direction of the compass.
+
+use std::ops::Range;
+
+use antumbra::{Bvh, Ray};
+use rayon::prelude::*;
+
+use crate::curve::OrderedPoints;
+use crate::normals::unit;
+use crate::orientation::dot;
+use crate::visibility::{above, origin_offset};
+use crate::{Error, Job, Key, Monitor, Orientation, memory, sees_directions};
+
+/// Degrees between the rays that look for the highest surface.
+const SCAN: f64 = 0.5;
+
+/// Rays of an azimuth that look for it: from just below the zenith, which is on the plane of every facade, to just above the nadir.
+const LEVELS: usize = (180.0 / SCAN) as usize - 1;
+
+/// Halvings of the step in which the horizon is, to less than 0.001 degrees.
+const HALVINGS: usize = 9;
+
+/// Elevation from which on all up to the zenith is closed.
+const ZENITH: f64 = 89.998;
+
+/// Elevation of a ray that looks for the horizon.
+fn elevation(level: usize) -> f64 {
+    90.0 - SCAN * (level + 1) as f64
+}
+
+/// Job of horizon angles at sensors of a mesh, by rays: in each azimuth, the elevation from which on up to the zenith all of the
+/// sky is seen.
+///
+/// The result has an angle in degrees for each sensor and azimuth, `[sensors, azimuths]`: 90 below a surface, 0 on an open plain, and
+/// -90 where nothing is in the way. Points, normals and what is seen are those of [`sees_directions`], so what is behind the plane of
+/// a normal counts as a surface. A sensor without a normal of some length has the angle NaN.
+///
+/// Rays are half a degree apart in elevation, so surfaces that are lower than that may be missed where they float above others.
+/// The angle itself is the highest that is known to be closed, and less than 0.001 degrees below the true one.
+pub struct HorizonJob {
+    places: OrderedPoints,
+    orientation: Orientation,
+    azimuths: Vec<f64>,
+    /// Rays of the first search: of each azimuth, from the zenith down.
+    scan: Vec<[f32; 3]>,
+}
+
+impl HorizonJob {
+    /// The job of these sensors. `normals` are those of surfaces, or empty for points in free space. Azimuths are in degrees from
+    /// north through east.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if the lists differ in length, [`Error::Range`] if an azimuth is not finite, or [`Error::NoMemory`].
+    pub fn new(
+        points: &[[f32; 3]],
+        normals: &[[f32; 3]],
+        azimuths: &[f64],
+        orientation: &Orientation,
+    ) -> Result<Self, Error> {
+        check_azimuths(azimuths)?;
+        let places = OrderedPoints::new(points, normals)?;
+        let mut scan = memory::room("directions", azimuths.len() * LEVELS)?;
+        for &azimuth in azimuths {
+            let directions = (0..LEVELS)
+                .map(elevation)
+                .map(|elevation| orientation.direction(azimuth, elevation));
+            scan.extend(directions.map(|direction| direction.map(|x| x as f32)));
+        }
+        Ok(Self {
+            places,
+            orientation: *orientation,
+            azimuths: azimuths.to_vec(),
+            scan,
+        })
+    }
+
+    /// The ray of a sensor in a direction; `None` if the plane of its normal is in the way.
+    fn ray(&self, bvh: &Bvh, item: usize, direction: [f64; 3]) -> Option<Ray> {
+        let (point, bounds) = (self.places.points[item], bvh.bounds());
+        let dir = direction.map(|x| x as f32);
+        match self.places.normals.get(item) {
+            None => Some(Ray {
+                tnear: origin_offset(&bounds, point),
+                ..Ray::new(point, dir)
+            }),
+            Some(normal) => {
+                let normal = unit(normal.map(f64::from))?;
+                let is_above = dot(normal, dir.map(f64::from)) > 0.0;
+                is_above.then(|| Ray::new(above(&bounds, &point, normal), dir))
+            }
+        }
+    }
+
+    /// Whether a sensor has a place and faces somewhere.
+    fn has_value(&self, item: usize) -> bool {
+        let normal = self.places.normals.get(item);
+        self.places.points[item].iter().all(|x| x.is_finite())
+            && normal.is_none_or(|normal| unit(normal.map(f64::from)).is_some())
+    }
+
+    /// Moves the ends of each pair, a closed and an open elevation, to each other.
+    fn halve(&self, bvh: &Bvh, first: usize, ends: &mut [[f64; 2]]) {
+        let mut open: Vec<(usize, Ray)> = Vec::with_capacity(ends.len());
+        let (mut rays, mut hits) = (Vec::new(), Vec::new());
+        for _ in 0..HALVINGS {
+            open.clear();
+            for (index, [closed, open_end]) in ends.iter_mut().enumerate() {
+                if closed == open_end || closed.is_nan() {
+                    continue;
+                }
+                let middle = 0.5 * (*closed + *open_end);
+                let azimuth = self.azimuths[index % self.azimuths.len()];
+                let direction = self.orientation.direction(azimuth, middle);
+                let item = first + index / self.azimuths.len();
+                match self.ray(bvh, item, direction) {
+                    Some(ray) => open.push((index, ray)),
+                    None => *closed = middle,
+                }
+            }
+            rays.clear();
+            rays.extend(open.iter().map(|(_, ray)| *ray));
+            hits.clear();
+            hits.resize(rays.len(), false);
+            bvh.occluded_batch(&rays, &mut hits);
+            for (&(index, _), &is_hit) in open.iter().zip(&hits) {
+                let [closed, open_end] = &mut ends[index];
+                let middle = 0.5 * (*closed + *open_end);
+                *if is_hit { closed } else { open_end } = middle;
+            }
+        }
+    }
+}
+
+/// Refuses azimuths that are not finite.
+pub(crate) fn check_azimuths(azimuths: &[f64]) -> Result<(), Error> {
+    match azimuths.iter().find(|azimuth| !azimuth.is_finite()) {
+        Some(&found) => Err(Error::Range {
+            what: "azimuth",
+            found,
+            wanted: "a finite angle in degrees",
+        }),
+        None => Ok(()),
+    }
+}
+
+/// Angles from the answers of a job.
+pub(crate) fn angles(answers: &[Vec<u8>], count: usize) -> Result<Vec<f32>, Error> {
+    let mut angles = memory::room("angles", count)?;
+    let numbers = answers.iter().flat_map(|bytes| bytes.as_chunks::<4>().0);
+    angles.extend(numbers.map(|bytes| f32::from_le_bytes(*bytes)));
+    match angles.len() == count {
+        true => Ok(angles),
+        false => Err(Error::Answers),
+    }
+}
+
+impl Job for HorizonJob {
+    type Found = Vec<f32>;
+
+    const NAME: &'static str = "horizon/1";
+
+    fn items(&self) -> usize {
+        self.places.points.len()
+    }
+
+    fn rays_per_item(&self) -> u64 {
+        (self.azimuths.len() * (LEVELS + HALVINGS)) as u64
+    }
+
+    fn identify(&self, key: &mut Key) {
+        key.numbers(&self.azimuths);
+        for list in [&self.places.points, &self.places.normals, &self.scan] {
+            key.vectors(list);
+        }
+    }
+
+    fn answers(
+        &self,
+        bvh: &Bvh,
+        items: Range<usize>,
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<u8>, Error> {
+        let normals = match self.places.normals.is_empty() {
+            true => &[],
+            false => &self.places.normals[items.clone()],
+        };
+        let points = &self.places.points[items.clone()];
+        let far = f32::INFINITY;
+        let seen = sees_directions(bvh, points, normals, &self.scan, far, monitor)?;
+        let of_item = |index: usize| {
+            let item = items.start + index;
+            let mut ends: Vec<[f64; 2]> = (0..self.azimuths.len())
+                .map(|azimuth| {
+                    let is_closed = |level: &usize| !seen.get(index, azimuth * LEVELS + level);
+                    match (0..LEVELS).find(is_closed) {
+                        _ if !self.has_value(item) => [f64::NAN; 2],
+                        None => [-90.0; 2],
+                        Some(level) => [elevation(level), elevation(level) + SCAN],
+                    }
+                })
+                .collect();
+            self.halve(bvh, item, &mut ends);
+            let angle = |[closed, _]: [f64; 2]| if closed > ZENITH { 90.0 } else { closed as f32 };
+            ends.into_iter()
+                .flat_map(|ends| angle(ends).to_le_bytes())
+                .collect::<Vec<u8>>()
+        };
+        let found: Vec<Vec<u8>> = (0..items.len()).into_par_iter().map(of_item).collect();
+        Ok(found.concat())
+    }
+
+    fn finish(&self, answers: &[Vec<u8>]) -> Result<Vec<f32>, Error> {
+        let count = self.places.points.len() * self.azimuths.len();
+        let mut found = angles(answers, count)?;
+        if !self.azimuths.is_empty() {
+            self.places.put_back(self.azimuths.len(), &mut found);
+        }
+        Ok(found)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use antumbra::{Geometry, Recipe};
+
+    use super::*;
+    use crate::run;
+
+    const UP: [f32; 3] = [0.0, 0.0, 1.0];
+
+    fn horizon(
+        corners: &[[f32; 3]],
+        indices: &[[u32; 3]],
+        sensors: (&[[f32; 3]], &[[f32; 3]]),
+        azimuths: &[f64],
+    ) -> Vec<f32> {
+        let geometry = [Geometry::triangles(corners, indices)];
+        let bvh = Bvh::build(&geometry, &Recipe::default()).expect("a tree");
+        let job = HorizonJob::new(sensors.0, sensors.1, azimuths, &Orientation::default());
+        run(&job.expect("a job"), &bvh, &()).expect("angles")
+    }
+
+    #[test]
+    fn a_long_wall_has_the_angle_of_its_height_over_the_distance_along_the_azimuth() {
+        // 9 high, 10 to the east, long enough for all azimuths that it is in.
+        let corners = [
+            [10.0, -60.0, 0.0],
+            [10.0, 60.0, 0.0],
+            [10.0, 60.0, 9.0],
+            [10.0, -60.0, 9.0],
+        ];
+        let azimuths: Vec<f64> = (0..36).map(|i| 10.0 * f64::from(i)).collect();
+        let found = horizon(
+            &corners,
+            &[[0, 1, 2], [0, 2, 3]],
+            (&[[0.0; 3]], &[UP]),
+            &azimuths,
+        );
+        for (azimuth, found) in azimuths.iter().zip(found) {
+            let toward = azimuth.to_radians().sin();
+            let wanted = match toward > 1e-3 {
+                true => (9.0 * toward / 10.0).atan().to_degrees(),
+                false => 0.0,
+            };
+            let below = wanted - f64::from(found);
+            assert!(
+                (-1e-4..2.1e-3).contains(&below),
+                "{azimuth}: {found} for {wanted}"
+            );
+        }
+    }
+
+    #[test]
+    fn roofs_planes_and_nothing() {
+        let roof = [[-9.0, -9.0, 5.0], [9.0, -9.0, 5.0], [0.0, 9.0, 5.0]];
+        let indices = [[0, 1, 2]];
+        let azimuths = [0.0, 123.0];
+        let below = ([0.0, 0.0, 0.0], UP);
+        let above = ([0.0, 0.0, 6.0], UP);
+        let facade = ([0.0, 100.0, 9.0], [0.0, 1.0, 0.0]);
+        for ((point, normal), wanted) in [
+            (below, [90.0, 90.0]),
+            (above, [0.0, 0.0]),
+            (facade, [-90.0, 90.0]),
+            (([0.0; 3], [0.0; 3]), [f32::NAN; 2]),
+        ] {
+            let found = horizon(&roof, &indices, (&[point], &[normal]), &azimuths);
+            let is_close = |(a, b): (&f32, f32)| (a - b).abs() < 0.6 || a.is_nan() && b.is_nan();
+            assert!(
+                found.iter().zip(wanted).all(is_close),
+                "{point:?}: {found:?}"
+            );
+        }
+        let free = horizon(&roof, &indices, (&[[0.0, 0.0, -1.0]], &[]), &azimuths);
+        assert_eq!(free, [90.0, 90.0]);
+        let far = horizon(&roof, &indices, (&[[0.0, 0.0, 1e3]], &[]), &[0.0]);
+        assert!(far[0] < -89.0, "{far:?}");
+        assert!(HorizonJob::new(&[], &[], &[f64::NAN], &Orientation::default()).is_err());
+    }
+
+    #[test]
+    fn shares_have_the_angles_of_the_whole() {
+        let roof = [[-9.0, -9.0, 5.0], [9.0, -9.0, 5.0], [0.0, 9.0, 5.0]];
+        let geometry = [Geometry::triangles(&roof[..], vec![[0, 1, 2]])];
+        let bvh = Bvh::build(&geometry, &Recipe::default()).expect("a tree");
+        let points: Vec<[f32; 3]> = (0..50)
+            .map(|i| {
+                [
+                    (i * 37 % 50) as f32 - 25.0,
+                    (i * 11 % 50) as f32 - 25.0,
+                    0.0,
+                ]
+            })
+            .collect();
+        let normals = vec![UP; points.len()];
+        let job = HorizonJob::new(&points, &normals, &[0.0, 90.0], &Orientation::default());
+        let job = job.expect("a job");
+        let whole = run(&job, &bvh, &()).expect("angles");
+        let parts =
+            [0..7, 7..8, 8..50].map(|items| job.answers(&bvh, items, &()).expect("answers"));
+        assert_eq!(job.finish(&parts), Ok(whole));
+        assert_eq!(job.finish(&parts[1..]), Err(Error::Answers));
+    }
+}
