@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use antumbra::recipe::Order;
-use antumbra_mesh::{Warning, load_gltf, load_obj, load_stl, plain_material};
+use antumbra_mesh::{Names, Warning, load_gltf, load_obj, load_stl, plain_material};
 use antumbra_pbrt::{Diagnostic, Times};
 use antumbra_raster::RasterCells;
 use antumbra_scene::{Geometry, Material, Param, Scene, Shape, Texture, TriangleMesh, builtin};
@@ -69,6 +69,8 @@ pub struct Loaded {
     pub up: Upright,
     /// The `.pbrt` files that the scene was read from, without links and dots; empty for other formats.
     pub files: Vec<PathBuf>,
+    /// Names of objects and materials, of the shapes and instances of a mesh file.
+    pub names: Names,
     /// Cells of a height raster, which are the vertices of its mesh; `None` for other files.
     pub raster: Option<Arc<RasterCells>>,
     /// Every file that was read: scenes, meshes, images, spectra and buffers.
@@ -89,6 +91,7 @@ impl Loaded {
             stage: None,
             up: Upright::DEFAULT,
             files: Vec::new(),
+            names: Names::default(),
             raster: None,
             inputs: Vec::new(),
         }
@@ -275,11 +278,13 @@ fn of_model(path: &Path, mut model: antumbra_mesh::Model) -> Loaded {
     let left_out = std::mem::take(&mut model.notes);
     let warnings = std::mem::take(&mut model.warnings);
     let inputs = std::mem::take(&mut model.files);
+    let names = std::mem::take(&mut model.names);
     let (scene, own) = stage::scene_of_model(stem(path), model);
     Loaded {
         stage: Some(own),
         left_out,
         warnings,
+        names,
         inputs,
         ..Loaded::plain(scene)
     }

@@ -42,7 +42,7 @@ pub use adjust::{
     FilterKind, IntegratorKind, LookAt, SamplerName, choose_integrator, set_ambient, set_camera,
     set_crop, set_max_depth, set_resolution, set_samples,
 };
-pub use antumbra_mesh::Warning;
+pub use antumbra_mesh::{Names, Part, Warning};
 pub use antumbra_pbrt::{Diagnostic, Severity};
 pub use antumbra_raster::RasterCells;
 pub use crop::Crop;

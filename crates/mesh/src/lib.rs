@@ -5,6 +5,7 @@
 //! with their place, and replaced by plain grey. Memory stays within a limit of the caller.
 //!
 //! - `model.rs`: [`Model`], the contents of a file
+//! - `names.rs`: [`Names`] of objects and materials
 //! - `obj/`: [`load_obj`], with the materials of its `.mtl` files
 //! - `gltf/`: [`load_gltf`]; the crate `gltf` parses the JSON
 //! - `stl.rs`: [`load_stl`]
@@ -31,6 +32,7 @@ mod file;
 mod gltf;
 mod images;
 mod model;
+mod names;
 mod obj;
 mod stl;
 
@@ -41,6 +43,7 @@ use antumbra_scene::{Material, Rgb};
 
 pub use gltf::{load_gltf, parse_gltf};
 pub use model::{Model, View, Warning};
+pub use names::{Names, Part};
 pub use obj::{load_obj, parse_obj};
 pub use stl::{load_stl, parse_stl};
 

@@ -5,6 +5,8 @@ use std::path::PathBuf;
 
 use antumbra_scene::{Camera, Instance, Light, Material, Object, Shape};
 
+use crate::Names;
+
 /// Contents of a mesh file: geometry with its looks, and lights and a camera if the file has any.
 #[derive(Clone, Debug, Default)]
 pub struct Model {
@@ -16,6 +18,8 @@ pub struct Model {
     pub instances: Vec<Instance>,
     /// Materials. [`Shape::material`] is an index into this list.
     pub materials: Vec<Material>,
+    /// Names of objects and materials.
+    pub names: Names,
     /// Lights without a surface.
     pub lights: Vec<Light>,
     /// The first camera of the file.

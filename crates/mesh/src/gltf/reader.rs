@@ -14,7 +14,7 @@ use gltf::{Accessor, Document, Mesh, Node, Primitive, Semantic};
 use super::looks::{Look, Looks};
 use super::places;
 use crate::images::Images;
-use crate::{Model, Warning};
+use crate::{Model, Part, Warning};
 
 const INDEX_TYPES: &[DataType] = &[DataType::U8, DataType::U16, DataType::U32];
 /// Types of fractions of 1. Integers are normalized.
@@ -39,6 +39,8 @@ pub(super) struct Reader<'a> {
 struct Placed<'a> {
     mesh: Mesh<'a>,
     to_world: DMat4,
+    /// Name of the node, or else of the mesh.
+    name: String,
 }
 
 impl<'a> Reader<'a> {
@@ -104,12 +106,13 @@ impl<'a> Reader<'a> {
         for Placed {
             mesh,
             to_world: matrix,
+            name,
         } in placed
         {
             let index = mesh.index();
             let usable = matrix.is_finite() && matrix.determinant() != 0.0;
             if uses[&index] < 2 || !usable {
-                self.add_shapes(mesh, matrix, |_| true);
+                self.add_shapes((mesh, name), matrix, |_| true);
                 continue;
             }
             let object = match objects.get(&index) {
@@ -121,13 +124,14 @@ impl<'a> Reader<'a> {
                 }
             };
             if let Some(object) = object {
+                self.model.names.instances.push((name.clone(), object));
                 self.model.instances.push(Instance {
                     object,
                     world_from_object: Affine3::from_mat4(matrix.as_mat4()),
                 });
             }
             // Lights of instances would be dark.
-            self.add_shapes(mesh, matrix, |look| look.emission.is_some());
+            self.add_shapes((mesh, name), matrix, |look| look.emission.is_some());
         }
     }
 
@@ -158,7 +162,12 @@ impl<'a> Reader<'a> {
             let own = Mat4::from_cols_array_2d(&node.transform().matrix());
             let to_world = to_parent * own.as_dmat4();
             if let Some(mesh) = node.mesh() {
-                placed.push(Placed { mesh, to_world });
+                let name = node.name().or(mesh.name()).unwrap_or_default().to_owned();
+                placed.push(Placed {
+                    mesh,
+                    to_world,
+                    name,
+                });
             }
             if let Some(camera) = node.camera() {
                 places::add_camera(&camera, to_world.as_mat4(), &mut self.model);
@@ -173,10 +182,19 @@ impl<'a> Reader<'a> {
     }
 
     /// Adds the shapes of a mesh whose looks are `wanted`, in world space.
-    fn add_shapes(&mut self, mesh: &Mesh, to_world: &DMat4, wanted: impl Fn(&Look) -> bool) {
-        for shape in self.shapes(mesh, wanted) {
+    fn add_shapes(
+        &mut self,
+        (mesh, name): (&Mesh, &str),
+        to_world: &DMat4,
+        wanted: impl Fn(&Look) -> bool,
+    ) {
+        for (shape, mut part) in self.shapes(mesh, wanted) {
+            part.object = name.to_owned();
             // Only spheres cannot be transformed.
-            self.model.shapes.extend(shape.transformed(to_world));
+            if let Some(shape) = shape.transformed(to_world) {
+                self.model.shapes.push(shape);
+                self.model.names.shapes.push(vec![part]);
+            }
         }
     }
 
@@ -186,6 +204,9 @@ impl<'a> Reader<'a> {
         if shapes.is_empty() {
             return None;
         }
+        let (shapes, parts): (_, Vec<_>) = shapes.into_iter().unzip();
+        let parts = parts.into_iter().map(|part| vec![part]);
+        self.model.names.objects.push(parts.collect());
         self.model.objects.push(Object {
             name: format!("mesh {}", mesh.index()),
             shapes,
@@ -193,8 +214,8 @@ impl<'a> Reader<'a> {
         Some(self.model.objects.len() - 1)
     }
 
-    /// Shapes of a mesh whose looks are `wanted`, in the space of its node.
-    fn shapes(&mut self, mesh: &Mesh, wanted: impl Fn(&Look) -> bool) -> Vec<Shape> {
+    /// Shapes of a mesh whose looks are `wanted`, in the space of its node, with the names of their materials.
+    fn shapes(&mut self, mesh: &Mesh, wanted: impl Fn(&Look) -> bool) -> Vec<(Shape, Part)> {
         let mut shapes = Vec::new();
         for primitive in mesh.primitives() {
             let has_colors = primitive.get(&Semantic::Colors(0)).is_some();
@@ -212,16 +233,24 @@ impl<'a> Reader<'a> {
             };
             match self.primitive(&primitive, look.uv_set) {
                 Ok(None) => {}
-                Ok(Some(mesh)) => shapes.push(Shape {
-                    geometry: Geometry::Mesh(Arc::new(mesh)),
-                    material: look.material,
-                    area_light: look.emission.clone(),
-                    media: None,
-                    alpha,
-                    shadow_alpha: None,
-                    reverse_orientation: false,
-                    transform_swaps_handedness: false,
-                }),
+                Ok(Some(mesh)) => {
+                    let part = Part {
+                        object: String::new(),
+                        material: primitive.material().name().unwrap_or_default().to_owned(),
+                        triangles: mesh.indices.len(),
+                    };
+                    let shape = Shape {
+                        geometry: Geometry::Mesh(Arc::new(mesh)),
+                        material: look.material,
+                        area_light: look.emission.clone(),
+                        media: None,
+                        alpha,
+                        shadow_alpha: None,
+                        reverse_orientation: false,
+                        transform_swaps_handedness: false,
+                    };
+                    shapes.push((shape, part));
+                }
                 Err(mistake) => {
                     let (mesh, place) = (mesh.index(), primitive.index());
                     self.mistakes

@@ -169,6 +169,8 @@ pub(super) type Used = (String, usize, usize);
 /// Faces of one material.
 pub(super) struct Part {
     pub material: Option<Used>,
+    /// Consecutive triangles of one object and one group, each a place in the list of names, and their number.
+    runs: Vec<([usize; 2], usize)>,
     /// Vertex, texture coordinate and normal of every corner.
     triangles: Vec<[[u32; 3]; 3]>,
     /// Whether these are all faces of the file.
@@ -181,6 +183,10 @@ pub(super) struct Faces {
     parts: Vec<Part>,
     by_name: HashMap<Option<String>, usize>,
     current: Option<Used>,
+    /// Names of objects and groups; the first one is empty.
+    names: Vec<String>,
+    /// Object and group of the faces that follow.
+    owners: [usize; 2],
     /// Corners that refer to what may still follow: line, column, kind and number.
     open: Vec<(usize, usize, usize, i64)>,
 }
@@ -191,6 +197,21 @@ impl Faces {
     /// Sets the material of the faces that follow. An empty name is none.
     pub fn set_material(&mut self, used: Used) {
         self.current = Some(used).filter(|(name, _, _)| !name.is_empty());
+    }
+
+    /// Sets the object (0) or the group (1) of the faces that follow.
+    pub fn set_owner(&mut self, kind: usize, name: String) {
+        if self.names.is_empty() {
+            self.names.push(String::new());
+        }
+        self.owners[kind] = match (name.is_empty(), self.names.last()) {
+            (true, _) => 0,
+            (false, Some(last)) if *last == name => self.names.len() - 1,
+            (false, _) => {
+                self.names.push(name);
+                self.names.len() - 1
+            }
+        };
     }
 
     /// Reads `f`.
@@ -218,14 +239,22 @@ impl Faces {
         let part = *self.by_name.entry(name).or_insert_with(|| {
             parts.push(Part {
                 material: current.clone(),
+                runs: Vec::new(),
                 triangles: Vec::new(),
                 is_all: false,
             });
             parts.len() - 1
         });
-        let triangles = &mut self.parts[part].triangles;
+        let Part {
+            triangles, runs, ..
+        } = &mut self.parts[part];
         for pair in corners.windows(2).skip(1) {
             triangles.push([corners[0], pair[0], pair[1]]);
+        }
+        let count = corners.len().saturating_sub(2);
+        match runs.last_mut() {
+            Some((owners, sum)) if *owners == self.owners => *sum += count,
+            _ => runs.push((self.owners, count)),
         }
     }
 
@@ -299,6 +328,25 @@ impl Faces {
                 );
             }
         }
+    }
+
+    /// Names of the triangles of each of the [parts](Self::into_parts): of objects, or of groups in a file without objects.
+    pub fn names(&self) -> Vec<Vec<crate::Part>> {
+        let parts = self.parts.iter().filter(|part| !part.triangles.is_empty());
+        let parts = parts.collect::<Vec<_>>();
+        let mut runs = parts.iter().flat_map(|part| &part.runs);
+        let kind = usize::from(!runs.any(|([object, _], _)| *object > 0));
+        let named = |part: &&Part| {
+            let material = part.material.as_ref().map(|(name, _, _)| name.clone());
+            let material = material.unwrap_or_default();
+            let run = |(owners, triangles): &([usize; 2], usize)| crate::Part {
+                object: self.names.get(owners[kind]).cloned().unwrap_or_default(),
+                material: material.clone(),
+                triangles: *triangles,
+            };
+            part.runs.iter().map(run).collect()
+        };
+        parts.iter().map(named).collect()
     }
 
     /// The faces by material, in the order in which materials are first used.

@@ -30,8 +30,6 @@ use scan::{Mistakes, words};
 
 /// Statements without a meaning for a picture.
 const SILENT: &[&str] = &[
-    "g",
-    "o",
     "s",
     "mg",
     "bevel",
@@ -50,6 +48,8 @@ const LEFT_OUT: &[&str] = &[
 /// Bytes of memory for a vertex, a texture coordinate or a normal, and for a corner with its entry of a hash table.
 const PER_VERTEX: u64 = 24;
 const PER_CORNER: u64 = 56;
+/// Bytes of memory for the name of an object or a group, beside its text.
+const PER_NAME: u64 = 48;
 
 /// Reads an OBJ file with its materials and textures, within `max_bytes` of memory for each of the three. Positions are
 /// measured from `origin`, and rounded after that.
@@ -118,6 +118,7 @@ fn parse_within(
         lacks_library,
         ..
     } = reader;
+    model.names.shapes = faces.names();
     let parts = faces.into_parts();
     let opaque = opaque_instead(&parts, &materials);
     if let Some(note) = &opaque {
@@ -211,6 +212,7 @@ impl Reader<'_> {
         };
         let needed = match first {
             b"v" | b"vt" | b"vn" => PER_VERTEX,
+            b"o" | b"g" => PER_NAME + line.len() as u64,
             b"f" => PER_CORNER * rest.clone().count() as u64,
             _ => 0,
         };
@@ -227,6 +229,11 @@ impl Reader<'_> {
             b"vt" => self.lists.uv(column, rest, mistakes),
             b"vn" => self.lists.normal(column, rest, mistakes),
             b"f" => self.faces.face(column, rest, &self.lists, mistakes),
+            b"o" | b"g" => {
+                let kind = usize::from(first == b"g");
+                let name = scan::text_after(line, column + first.len());
+                self.faces.set_owner(kind, name);
+            }
             b"usemtl" => {
                 let name = scan::text_after(line, column + first.len());
                 self.faces.set_material((name, mistakes.line, column));

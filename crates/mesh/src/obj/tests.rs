@@ -498,3 +498,40 @@ fn damaged_files_are_errors_or_other_meshes() {
     }
     assert!(good > 0);
 }
+
+#[test]
+fn triangles_have_the_names_of_their_objects_or_groups() {
+    let faces = "f 1 2 3\n";
+    let names = |text: &str| {
+        let obj = format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n{text}");
+        let model = parse_obj(obj.as_bytes(), Path::new("a.obj")).expect("a model");
+        let part =
+            |part: &crate::Part| (part.object.clone(), part.material.clone(), part.triangles);
+        let parts = model
+            .names
+            .shapes
+            .iter()
+            .map(|parts| parts.iter().map(part).collect());
+        parts.collect::<Vec<Vec<_>>>()
+    };
+    let part = |object: &str, material: &str, triangles| {
+        (object.to_owned(), material.to_owned(), triangles)
+    };
+    assert_eq!(names(faces), [vec![part("", "", 1)]]);
+    // Groups count in a file without objects, and names may come again.
+    let groups =
+        format!("g a wall\n{faces}f 1 2 4 3\ng b\n{faces}usemtl m\n{faces}g a wall\n{faces}");
+    let wanted = [
+        vec![part("a wall", "", 3), part("b", "", 1)],
+        vec![part("b", "m", 1), part("a wall", "m", 1)],
+    ];
+    assert_eq!(names(&groups), wanted);
+    let objects = format!("{faces}o house\ng a\n{faces}g b\n{faces}o\n{faces}");
+    let wanted = vec![
+        part("", "", 1),
+        part("house", "", 1),
+        part("house", "", 1),
+        part("", "", 1),
+    ];
+    assert_eq!(names(&objects), [wanted]);
+}
