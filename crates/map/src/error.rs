@@ -47,6 +47,9 @@ pub enum Error {
     /// A picture inside of the map cannot be encoded.
     #[error(transparent)]
     Image(#[from] antumbra_image::Error),
+    /// Pictures cannot be encoded as GIF.
+    #[error("GIF: {0}")]
+    Gif(String),
     /// The font cannot be embedded.
     #[error("the font cannot be embedded: {0}")]
     Font(String),

@@ -43,10 +43,12 @@
 //! - `theme.rs`: [`Theme`], colours of paper and text
 //! - `drawing.rs`: [`Drawing`], a list of shapes and text
 //! - `pixels.rs`, `svg.rs`, `pdf.rs`: drawings in one format each
+//! - `animation.rs`: [`Animation`], pictures one after the other as GIF
 //! - `font.rs`: widths and outlines of letters
 //! - `error.rs`: [`Error`]
 #![forbid(unsafe_code)]
 
+mod animation;
 mod drawing;
 mod error;
 mod font;
@@ -62,6 +64,7 @@ mod steps;
 mod svg;
 mod theme;
 
+pub use animation::Animation;
 pub use drawing::Drawing;
 pub use error::Error;
 pub use font::check as check_text;

@@ -30,7 +30,7 @@ pub struct Map<'a> {
     pub cell: f64,
     /// Metres in a unit of the model; `None` if nobody knows: the scale bar then counts units.
     pub metres: Option<f64>,
-    /// Degrees from the top of the map to true north, clockwise.
+    /// Degrees from the top of the map to true north, clockwise. NaN for no arrow, as where the map is an elevation.
     pub north: f64,
     /// Title above the map.
     pub title: &'a str,
@@ -352,6 +352,9 @@ impl Parts<'_> {
     }
 
     fn north_arrow(&mut self) {
+        if self.map.north.is_nan() {
+            return;
+        }
         let em = self.layout.em;
         let [x, y] = self.layout.arrow_at;
         let middle = [x, y + 1.9 * em];

@@ -11,6 +11,8 @@ pub struct Steps {
     pub marks: Vec<f64>,
     /// Decimals of labels.
     pub decimals: usize,
+    /// Words of the marks instead of numbers: classes, whose colours do not run into each other. Empty for numbers.
+    pub names: Vec<String>,
 }
 
 /// Largest number of steps.
@@ -61,6 +63,19 @@ impl Steps {
             // Minus 0 would be written with its sign.
             marks: marks.map(|x| x + 0.0).collect(),
             decimals,
+            names: Vec::new(),
+        }
+    }
+
+    /// Classes with names: the values 0, 1 and so on.
+    pub fn named(names: &[&str]) -> Self {
+        let high = names.len().saturating_sub(1).max(1) as f64;
+        Self {
+            low: 0.0,
+            high,
+            marks: (0..names.len()).map(|i| i as f64).collect(),
+            decimals: 0,
+            names: names.iter().map(|&name| name.to_owned()).collect(),
         }
     }
 
