@@ -86,6 +86,8 @@ fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Some(Command::Ao(args)) => bake::ao::run(&args, memory, None),
         Some(Command::Sun(args)) => bake::sun::run(&args, memory, None),
         Some(Command::Visible(args)) => bake::visible::run(&args, memory, None),
+        Some(Command::Horizon(args)) => bake::horizon::run(&args, memory, None),
+        Some(Command::Factors(args)) => bake::factors::run(&args, memory, None),
         Some(Command::Info(args)) => info::run(&args, memory),
         Some(Command::Image(command)) => return image_tools::run(&command),
         Some(Command::List(args)) => list::run(&args),

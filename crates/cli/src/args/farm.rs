@@ -11,7 +11,7 @@ use super::{SCENE, SCENE_LONG, heading};
 pub enum FarmCommand {
     /// Submit an array job of Slurm, and a job that merges
     ///
-    /// Every task computes one part of an image, or of a job of ao, sun or visible, and a dependent job merges them. Tasks that are preempted, lose
+    /// Every task computes one part of an image, or of a job of another command, and a dependent job merges them. Tasks that are preempted, lose
     /// their machine or come near their time limit go on from their checkpoints. The dependent job submits again
     /// what is missing. So does this command when it is given again. Prints the numbers of the jobs.
     Slurm(SlurmArgs),
@@ -29,6 +29,8 @@ pub enum FarmJob {
     Ao,
     Sun,
     Visible,
+    Horizon,
+    Factors,
 }
 
 impl FarmJob {
@@ -39,6 +41,8 @@ impl FarmJob {
             Self::Ao => "ao",
             Self::Sun => "sun",
             Self::Visible => "visible",
+            Self::Horizon => "horizon",
+            Self::Factors => "factors",
         }
     }
 }
@@ -50,10 +54,15 @@ pub struct FarmArgs {
     pub scene: PathBuf,
     /// File to write: an image, or a result of the job
     ///
-    /// May be given several times for jobs of sun and visible.
+    /// May be given several times for all jobs but render and ao.
     #[arg(short, long, value_name = "FILE", required = true, help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
-    /// render, ao, sun or visible
+    /// Lines of sight, for visible
+    ///
+    /// As --lines of visible: a .csv of pairs, or a .ply of edges. The last task writes them.
+    #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
+    pub lines: Option<PathBuf>,
+    /// render, ao, sun, visible, horizon, factors
     #[arg(long = "command", value_name = "COMMAND", value_enum, default_value_t = FarmJob::Render, hide_possible_values = true, help_heading = heading::JOB)]
     pub job: FarmJob,
     /// Standard error of every pixel's mean, as .exr

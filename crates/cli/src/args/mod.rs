@@ -1,6 +1,6 @@
 //! Commands and flags, each defined once together with its help.
 //!
-//! - `render`, `view`, `merge`, `farm`, `study`, `probe`, `bench`, `ao`, `sun`, `visible`, `info`, `image`, `list`, `man`: the flags of one
+//! - `render`, `view`, `merge`, `farm`, `study`, `probe`, `bench`, `ao`, `sun`, `visible`, `horizon`, `factors`, `info`, `image`, `list`, `man`: the flags of one
 //!   command each
 //! - `camera`: flags about camera, film and light
 //! - `picture`, `tree`, `display`, `machine`, `map`, `chunks`: flags that several commands have
@@ -12,7 +12,9 @@ mod bench;
 mod camera;
 mod chunks;
 mod display;
+mod factors;
 mod farm;
+mod horizon;
 mod image;
 mod info;
 mod list;
@@ -46,7 +48,9 @@ pub use bench::BenchArgs;
 pub use camera::{CameraArgs, PoseArgs};
 pub use chunks::ChunkArgs;
 pub use display::{AovNames, DisplayArgs, is_for_displays, usual};
+pub use factors::FactorArgs;
 pub use farm::{FarmArgs, FarmCommand, FarmJob, OpenjdArgs, SlurmArgs};
+pub use horizon::HorizonArgs;
 pub use image::{CompareArgs, ImageCommand};
 pub use info::InfoArgs;
 pub use list::{ListArgs, ListName};
@@ -58,10 +62,10 @@ pub use picture::PictureArgs;
 pub use probe::ProbeArgs;
 pub use raster::RasterArgs;
 pub use render::{RenderArgs, UntilArgs};
-pub use sensors::PlacementArgs;
+pub use sensors::PlaceArgs;
 pub use slips::parse;
 pub use study::StudyArgs;
-pub use sun::{Shown, SunArgs};
+pub use sun::{By, Shown, SunArgs};
 pub use times::TimeArgs;
 pub use values::CameraChoice;
 pub use view::ViewArgs;
@@ -163,7 +167,7 @@ pub enum Command {
     View(ViewArgs),
     /// Join the parts of a picture or a bake made by `--shard`
     ///
-    /// The output has the same bits as if one machine had made it. Of `ao`, `sun` and `visible`, the mesh and the tables are
+    /// The output has the same bits as if one machine had made it. Of bakes, the mesh and the tables are
     /// read again, under the names that made the parts. Parts that are missing, given twice,
     /// incomplete or of another picture are refused by name.
     Merge(MergeArgs),
@@ -224,6 +228,19 @@ pub enum Command {
     /// Points see each other if nothing lies between them. With --viewshed, the result is how many points of
     /// A.csv see each place of the mesh.
     Visible(VisibleArgs),
+    /// Find how high the horizon is in each direction
+    ///
+    /// The angle is the elevation in degrees from which on up to the zenith all of the sky is seen: 0 on an open plain, 90 below a
+    /// roof. Directions behind the surface of a sensor count as closed. Cells of a height raster (--cells) are computed exactly, from
+    /// its triangles in double precision. Otherwise rays find the angle to less than 0.001 degrees, and may miss surfaces that float
+    /// above others and are less than half a degree high.
+    #[command(override_usage = "antumbra horizon [OPTIONS] -o <OUT> <SENSORS> <SCENE>")]
+    Horizon(HorizonArgs),
+    /// Find how much of the light of a surface arrives at others
+    ///
+    /// View factors: the part of the light that leaves a surface evenly and arrives at each other one, or nowhere. Rows add up to
+    /// 1. Triangles emit on the side from which their corners run anticlockwise; both sides receive.
+    Factors(FactorArgs),
     /// Describe a scene and its trees
     Info(InfoArgs),
     /// Compare, convert and draw images

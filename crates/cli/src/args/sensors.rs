@@ -1,11 +1,65 @@
-//! Flags that place sensors on surfaces and along lines, and lift them.
+//! Flags that place sensors: in grids, on surfaces, along lines.
 
 use std::path::PathBuf;
 
-use antumbra_bake::Surface;
-use clap::Args;
+use antumbra_bake::{Surface, UpAxis};
+use clap::{Args, ValueEnum};
 
 use super::{heading, values};
+
+/// Flags that say where sensors are, and how the scene stands.
+#[derive(Debug, Args)]
+#[command(next_help_heading = heading::SENSORS)]
+pub struct PlaceArgs {
+    /// Sensors from a table: x, y [, z] [, nx, ny, nz]
+    ///
+    /// Columns are known by the names in the first line, or else by their order. Sensors without normals see all around.
+    /// Coordinates are in the system of the mesh. Sensors without heights are on the surface that is seen from above. Names, in a column
+    /// name or id, come back in a .csv.
+    #[arg(long, value_name = "FILE", group = "where")]
+    pub sensors: Option<PathBuf>,
+    /// A sensor in every square of this size
+    ///
+    /// Sensors lie on the surfaces that are uppermost, roofs and ground alike, and face as these do.
+    #[arg(long, value_name = "METRES", group = "where", value_parser = values::positive)]
+    pub grid: Option<f64>,
+    /// Look at facades from a side: south, 135, ...
+    ///
+    /// The squares of --grid are then upright, and cover what is seen from far away on this side: north, east, south, west, or an
+    /// azimuth in degrees. Maps show this elevation. Results cannot be GeoTIFF.
+    #[arg(long, value_name = "SIDE", requires = "grid", conflicts_with = "height", value_parser = side)]
+    pub seen_from: Option<Side>,
+    /// Only on one object of the scene, by its name
+    ///
+    /// Objects are those of --by object. Everything else still casts shadows. With --grid or --surfaces.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["vertices", "sensors", "along"])]
+    pub only: Option<String>,
+    /// A sensor at every vertex
+    ///
+    /// Vertices of a height raster are the centres of its cells.
+    #[arg(long, visible_alias = "cells", group = "where")]
+    pub vertices: bool,
+    #[command(flatten)]
+    pub placement: PlacementArgs,
+    /// Axis that points up [default: the scene's]
+    ///
+    /// North is y where z points up, and -z where y does.
+    #[arg(long, value_name = "AXIS", value_parser = up_axis)]
+    pub up: Option<UpAxis>,
+    /// Angle from mesh to true north
+    ///
+    /// Clockwise as seen from above: 90 where the x axis of a mesh with z up points north.
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    pub north: f64,
+    /// Unit: mm, cm, m, km, in or ft
+    #[arg(long, value_enum, default_value_t = Unit::M, hide_possible_values = true)]
+    pub units: Unit,
+}
 
 /// Flags that place sensors on surfaces and along lines, and lift them.
 #[derive(Debug, Args)]
@@ -76,6 +130,79 @@ impl PlacementArgs {
             false => self.on.clone(),
         }
     }
+}
+
+/// Unit of length.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Unit {
+    Mm,
+    Cm,
+    M,
+    Km,
+    In,
+    Ft,
+}
+
+impl Unit {
+    /// Length in metres.
+    pub const fn metres(self) -> f64 {
+        match self {
+            Self::Mm => 0.001,
+            Self::Cm => 0.01,
+            Self::M => 1.0,
+            Self::Km => 1000.0,
+            Self::In => 0.0254,
+            Self::Ft => 0.3048,
+        }
+    }
+}
+
+/// Parses an axis.
+pub fn up_axis(text: &str) -> Result<UpAxis, String> {
+    match text {
+        "y" | "Y" => Ok(UpAxis::Y),
+        "z" | "Z" => Ok(UpAxis::Z),
+        _ => Err("it must be y or z".into()),
+    }
+}
+
+/// Side from which facades are seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Side {
+    /// Degrees from north through east.
+    pub azimuth: f64,
+}
+
+/// Names of sides, 45 degrees apart.
+const SIDES: [&str; 8] = [
+    "north",
+    "north-east",
+    "east",
+    "south-east",
+    "south",
+    "south-west",
+    "west",
+    "north-west",
+];
+
+impl Side {
+    /// Name, or the azimuth.
+    pub fn name(&self) -> String {
+        let place = self.azimuth.rem_euclid(360.0) / 45.0;
+        match SIDES.get(place as usize) {
+            Some(name) if place.fract() == 0.0 => (*name).to_owned(),
+            _ => format!("{}°", self.azimuth),
+        }
+    }
+}
+
+fn side(text: &str) -> Result<Side, String> {
+    let name = text.trim().to_ascii_lowercase();
+    let known = SIDES.iter().position(|side| *side == name);
+    let known = known.map(|place| 45.0 * place as f64);
+    let azimuth = known.or(name.parse().ok()).filter(|x: &f64| x.is_finite());
+    let azimuth = azimuth.ok_or("wanted north, north-east, east and so on, or degrees")?;
+    Ok(Side { azimuth })
 }
 
 fn surface(text: &str) -> Result<Surface, String> {

@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use antumbra_bake::{Moment, SkyDivision, UpAxis};
+use antumbra_bake::{Moment, SkyDivision};
 use clap::{ArgGroup, Args, ValueEnum};
 
 use super::{
-    ChunkArgs, MachineArgs, MapArgs, PlacementArgs, RasterArgs, SCENE, SCENE_LONG, TimeArgs,
-    heading, values,
+    ChunkArgs, MachineArgs, MapArgs, PlaceArgs, RasterArgs, SCENE, SCENE_LONG, TimeArgs, heading,
+    values,
 };
 use crate::json::Destination;
 
@@ -41,41 +41,30 @@ pub struct SunArgs {
     /// array values, steps x sensors, with times, the beginnings of the steps in Unix time, and points.
     #[arg(long, value_name = "FILE", value_parser = values::output_file(), conflicts_with = "shard", help_heading = heading::OUTPUT)]
     pub hourly: Option<PathBuf>,
+    /// Means, ends and sums by object, material or facade
+    ///
+    /// A .csv or .json with a line for each group of --by: its area in m², its sensors, and of each value the mean, the smallest and
+    /// the largest of them. Energies have a sum too: the mean times the area, in kWh. Sensors belong to the surface that they are on,
+    /// or that is below them.
+    #[arg(long, value_name = "FILE", value_parser = values::output_file(), conflicts_with = "shard", help_heading = heading::OUTPUT)]
+    pub groups: Option<PathBuf>,
+    /// object, material or facade
+    ///
+    /// Objects are those of `o` or else `g` in an .obj, and the nodes of a .gltf. Where nothing has a name, surfaces that touch are a
+    /// body. A facade is all of an object that faces one of eight sides of the compass; roofs, ground and undersides have lines too.
+    #[arg(long, value_name = "KIND", value_enum, default_value_t = By::Object, hide_possible_values = true, requires = "groups", help_heading = heading::OUTPUT)]
+    pub by: By,
+    /// Moving shadows: .gif, or .png for each step
+    ///
+    /// A map of each step of time with a sun above the horizon, with its time in the title. A .gif has them all. Of NAME.png, the
+    /// files are NAME-0001.png and so on. Needs --grid.
+    #[arg(long, value_name = "FILE", value_parser = values::output_file(), conflicts_with = "shard", help_heading = heading::OUTPUT)]
+    pub frames: Option<PathBuf>,
     /// Figures as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
     pub json: Option<Destination>,
-    /// Sensors from a table: x, y [, z] [, nx, ny, nz]
-    ///
-    /// Columns are known by the names in the first line, or else by their order. Sensors without normals see all around.
-    /// Coordinates are in the system of the mesh. Sensors without heights are on the surface that is seen from above. Names, in a column
-    /// name or id, come back in a .csv.
-    #[arg(long, value_name = "FILE", group = "where", help_heading = heading::SENSORS)]
-    pub sensors: Option<PathBuf>,
-    /// A sensor in every square of this size
-    ///
-    /// Sensors lie on the surfaces that are uppermost, roofs and ground alike, and face as these do.
-    #[arg(long, value_name = "METRES", group = "where", value_parser = values::positive, help_heading = heading::SENSORS)]
-    pub grid: Option<f64>,
-    /// A sensor at every vertex
-    ///
-    /// Vertices of a height raster are the centres of its cells.
-    #[arg(long, visible_alias = "cells", group = "where", help_heading = heading::SENSORS)]
-    pub vertices: bool,
     #[command(flatten)]
-    pub placement: PlacementArgs,
-    /// Axis that points up [default: the scene's]
-    ///
-    /// North is y where z points up, and -z where y does.
-    #[arg(long, value_name = "AXIS", value_parser = up_axis, help_heading = heading::SENSORS)]
-    pub up: Option<UpAxis>,
-    /// Angle from mesh to true north
-    ///
-    /// Clockwise as seen from above: 90 where the x axis of a mesh with z up points north.
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, help_heading = heading::SENSORS)]
-    pub north: f64,
-    /// Unit: mm, cm, m, km, in or ft
-    #[arg(long, value_enum, default_value_t = Unit::M, hide_possible_values = true, help_heading = heading::SENSORS)]
-    pub units: Unit,
+    pub places: PlaceArgs,
     /// Latitude in degrees, south negative
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, requires = "lon", required_unless_present = "epw", help_heading = heading::SUN)]
     pub lat: Option<f64>,
@@ -134,6 +123,17 @@ pub struct SunArgs {
     pub machine: MachineArgs,
 }
 
+/// What groups of sensors have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum By {
+    /// Objects, or bodies that touch
+    Object,
+    /// Materials
+    Material,
+    /// Sides of objects
+    Facade,
+}
+
 /// Value of sensors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Shown {
@@ -147,40 +147,6 @@ pub enum Shown {
     Diffuse,
     /// Both together, with --epw
     Total,
-}
-
-/// Unit of length.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Unit {
-    Mm,
-    Cm,
-    M,
-    Km,
-    In,
-    Ft,
-}
-
-impl Unit {
-    /// Length in metres.
-    pub const fn metres(self) -> f64 {
-        match self {
-            Self::Mm => 0.001,
-            Self::Cm => 0.01,
-            Self::M => 1.0,
-            Self::Km => 1000.0,
-            Self::In => 0.0254,
-            Self::Ft => 0.3048,
-        }
-    }
-}
-
-/// Parses an axis.
-pub fn up_axis(text: &str) -> Result<UpAxis, String> {
-    match text {
-        "y" | "Y" => Ok(UpAxis::Y),
-        "z" | "Z" => Ok(UpAxis::Z),
-        _ => Err("it must be y or z".into()),
-    }
 }
 
 /// Parses an end: a date counts to the midnight after it.

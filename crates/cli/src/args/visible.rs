@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use antumbra_bake::UpAxis;
 use clap::{ArgGroup, Args};
 
-use super::sun::{Unit, up_axis};
+use super::sensors::{Unit, up_axis};
 use super::{ChunkArgs, MachineArgs, MapArgs, RasterArgs, SCENE, SCENE_LONG, heading, values};
 use crate::json::Destination;
 
@@ -62,7 +62,8 @@ pub struct VisibleArgs {
     /// Left out at both ends [default: origin offset]
     ///
     /// The origin offset is about 4 millionths of the largest coordinate. A point on a surface is rounded, and without a
-    /// margin its own surface hides it now and then. 0 takes the bare lines.
+    /// margin its own surface hides it now and then. 0 takes the bare lines. The viewshed of a height raster is then made by rays
+    /// too, instead of exactly.
     #[arg(long, value_name = "UNITS", value_parser = values::from_zero, help_heading = heading::WORK)]
     pub margin: Option<f64>,
     /// Axis that points up [default: the scene's]

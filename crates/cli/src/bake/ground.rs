@@ -12,6 +12,7 @@ use antumbra_load::{Extent, Loaded, MemorySize, Up};
 use antumbra_render::World;
 use antumbra_scene::{Geometry, Scene, Shape, TriangleMesh};
 
+use super::parts::Parts;
 use crate::exit::{Failure, say, tell};
 use crate::output::Files;
 use crate::{input, interrupt, scenes};
@@ -23,6 +24,8 @@ pub struct Ground {
     pub bvh: Bvh,
     /// All meshes as one, measured from `local`.
     pub mesh: Mesh,
+    /// Names of the triangles of `mesh`.
+    pub parts: Parts,
     /// Origin of all positions.
     pub local: LocalOrigin,
     /// How the scene is bent, if it is.
@@ -49,6 +52,7 @@ impl Ground {
             None => None,
         };
         let (mesh, _) = mesh(&loaded.scene, false)?;
+        let parts = Parts::new(&loaded.scene, &loaded.names);
         let local = LocalOrigin {
             origin: loaded.scene.origin.into(),
         };
@@ -61,6 +65,7 @@ impl Ground {
             world,
             bvh,
             mesh,
+            parts,
             local,
             curvature,
             build_seconds: start.elapsed().as_secs_f64(),
@@ -131,6 +136,11 @@ impl Ground {
 
     /// Sensors on a grid.
     pub fn grid(&self, spacing: f64, plan: &Orientation) -> Result<Sensors, Failure> {
+        self.grid_of(&self.bvh, spacing, plan)
+    }
+
+    /// Sensors on a grid that sees the surfaces of a tree, which are some of the scene.
+    pub fn grid_of(&self, bvh: &Bvh, spacing: f64, plan: &Orientation) -> Result<Sensors, Failure> {
         let offset = self.bvh.bounds().origin_offset();
         if f64::from(offset) > 1e-3 * spacing {
             say(format_args!(
@@ -138,7 +148,7 @@ impl Ground {
                  scene is large for such a grid"
             ));
         }
-        let sensors = Sensors::on_grid(&self.bvh, spacing, plan);
+        let sensors = Sensors::on_grid(bvh, spacing, plan);
         sensors.map_err(|error| match error {
             Error::NothingBelow => Failure::Usage(format!("--grid: {error}; is --up right?")),
             _ => Failure::Usage(format!("--grid {spacing}: that makes {error}")),

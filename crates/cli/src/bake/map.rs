@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use antumbra::Bvh;
 use antumbra_bake::{Grid, Layout, Moment, Orientation, Sensors, UpAxis};
 use antumbra_image::atomic_write;
-use antumbra_map::{Map, Relief, Steps};
+use antumbra_map::{Drawing, Map, Relief, Steps};
 
 use super::ground::Ground;
 use crate::args::MapArgs;
@@ -33,6 +34,7 @@ const MONTHS: [&str; 12] = [
 ];
 
 /// What a map says of its values.
+#[derive(Default)]
 pub struct Words<'a> {
     /// Title, where the command line has none.
     pub title: String,
@@ -49,13 +51,15 @@ pub struct Words<'a> {
 /// Where the grid of a map is.
 pub struct Plan<'a> {
     pub ground: &'a Ground,
+    /// Tree of the surfaces that have sensors.
+    pub bvh: &'a Bvh,
     /// East, north and up of the mesh, in which rows of the grid run.
     pub orientation: &'a Orientation,
     pub up: UpAxis,
     /// Edge of a cell, in units of the mesh.
     pub cell: f64,
-    /// Degrees from north of the mesh to true north, clockwise.
-    pub north: f64,
+    /// Degrees from north of the mesh to true north, clockwise; `None` for a map that is not seen from above.
+    pub north: Option<f64>,
     /// Metres in a unit of the mesh, if they are known.
     pub metres: Option<f64>,
 }
@@ -76,83 +80,129 @@ pub fn world_files(outputs: &[PathBuf]) -> Vec<PathBuf> {
     maps.map(|path| path.with_extension("pgw")).collect()
 }
 
-/// Writes a map as PNG with its world file, as SVG or as PDF, by the extension.
-pub fn write(
-    path: &Path,
-    args: &MapArgs,
-    plan: &Plan<'_>,
-    words: &Words<'_>,
-    (sensors, values): (&Sensors, &[f32]),
-) -> Result<(), Failure> {
-    let Layout::Grid(grid) = &sensors.layout else {
-        return Err(Failure::Usage("a map needs --grid".into()));
-    };
-    let steps = match args.ends() {
-        Some([low, high]) => Steps::between(low, high, words.whole),
-        None => Steps::around(values, words.whole),
-    };
-    let values = grid.picture(values);
-    let source = source(&words.files, plan);
-    let mut map = Map {
-        values: &values,
-        width: grid.width,
-        height: grid.height,
-        cell: plan.cell,
-        metres: plan.metres,
-        north: plan.north,
-        title: args.title.as_deref().unwrap_or(&words.title),
-        subtitle: &words.subtitle,
-        quantity: words.quantity,
-        unit: words.unit,
-        steps,
-        source: &source,
-        relief: None,
-        theme: args.theme(),
-    };
-    let size = args.resolution.map_or(map.usual_size(), |size| size.0);
-    let [columns, rows] = map.relief_size(size).map_err(Failure::work)?;
-    let coarser = (columns as f64 * rows as f64 / MOST_PIXELS).sqrt().max(1.0);
-    let pixel = coarser * map.relief_pixel(size).map_err(Failure::work)?;
-    // Sensors of pixels are where rays from above hit the model.
-    let seen = Sensors::on_grid(&plan.ground.bvh, pixel, plan.orientation)?;
-    let relief = Seen::new(&seen, plan.orientation);
-    map.relief = relief.as_ref().map(|seen| Relief {
-        width: seen.grid.width,
-        height: seen.grid.height,
-        pixel,
-        heights: &seen.heights,
-        normals: &seen.normals,
-    });
-    let drawing = map.draw(size).map_err(Failure::work)?;
-    match extension(path).as_str() {
-        "svg" => {
-            let text = drawing.svg().map_err(Failure::work)?;
-            atomic_write(path, |file| file.write_all(text.as_bytes()))?;
-        }
-        "pdf" => {
-            let bytes = drawing.pdf().map_err(Failure::work)?;
-            atomic_write(path, |file| file.write_all(&bytes))?;
-        }
-        _ => drawing.pixels().map_err(Failure::work)?.write(path)?,
-    }
-    if has_world_file(path) {
-        let text = world_file(&map, size, plan)?;
-        atomic_write(path.with_extension("pgw"), |file| {
-            file.write_all(text.as_bytes())
-        })?;
-    }
-    Ok(())
+/// A sheet on which values of a grid are drawn.
+pub struct Sheet<'a> {
+    args: &'a MapArgs,
+    plan: &'a Plan<'a>,
+    grid: &'a Grid,
+    size: [u32; 2],
+    relief: Option<Seen>,
 }
 
-/// The model from above, with places without a surface.
-struct Seen<'a> {
-    grid: &'a Grid,
+impl<'a> Sheet<'a> {
+    /// A sheet for the values of sensors, which must be on a grid.
+    pub fn new(
+        args: &'a MapArgs,
+        plan: &'a Plan<'a>,
+        sensors: &'a Sensors,
+    ) -> Result<Self, Failure> {
+        let Layout::Grid(grid) = &sensors.layout else {
+            return Err(Failure::Usage("a map needs --grid".into()));
+        };
+        let words = Words::default();
+        let mut sheet = Self {
+            args,
+            plan,
+            grid,
+            size: [0; 2],
+            relief: None,
+        };
+        let map = sheet.map(&words, (&[], ""), Steps::between(0.0, 1.0, false));
+        let size = args.resolution.map_or(map.usual_size(), |size| size.0);
+        let [columns, rows] = map.relief_size(size).map_err(Failure::work)?;
+        let coarser = (columns as f64 * rows as f64 / MOST_PIXELS).sqrt().max(1.0);
+        let pixel = coarser * map.relief_pixel(size).map_err(Failure::work)?;
+        // Sensors of pixels are where rays from above hit the model.
+        let seen = Sensors::on_grid(plan.bvh, pixel, plan.orientation)?;
+        sheet.relief = Seen::new(&seen, plan.orientation, pixel);
+        sheet.size = size;
+        Ok(sheet)
+    }
+
+    fn map<'b>(
+        &'b self,
+        words: &'b Words<'_>,
+        (values, source): (&'b [f32], &'b str),
+        steps: Steps,
+    ) -> Map<'b> {
+        let relief = self.relief.as_ref();
+        Map {
+            values,
+            width: self.grid.width,
+            height: self.grid.height,
+            cell: self.plan.cell,
+            metres: self.plan.metres,
+            north: self.plan.north.unwrap_or(f64::NAN),
+            title: self.args.title.as_deref().unwrap_or(&words.title),
+            subtitle: &words.subtitle,
+            quantity: words.quantity,
+            unit: words.unit,
+            steps,
+            source,
+            relief: relief.map(|seen| Relief {
+                width: seen.width,
+                height: seen.height,
+                pixel: seen.pixel,
+                heights: &seen.heights,
+                normals: &seen.normals,
+            }),
+            theme: self.args.theme(),
+        }
+    }
+
+    /// Draws the values of the sensors.
+    pub fn draw(
+        &self,
+        words: &Words<'_>,
+        values: &[f32],
+        steps: Steps,
+    ) -> Result<Drawing, Failure> {
+        let (values, source) = (self.grid.picture(values), source(&words.files, self.plan));
+        let map = self.map(words, (&values, &source), steps);
+        map.draw(self.size).map_err(Failure::work)
+    }
+
+    /// Writes the values as PNG with its world file, as SVG or as PDF, by the extension.
+    pub fn write(&self, path: &Path, words: &Words<'_>, values: &[f32]) -> Result<(), Failure> {
+        let steps = match self.args.ends() {
+            Some([low, high]) => Steps::between(low, high, words.whole),
+            None => Steps::around(values, words.whole),
+        };
+        let drawing = self.draw(words, values, steps.clone())?;
+        match extension(path).as_str() {
+            "svg" => {
+                let text = drawing.svg().map_err(Failure::work)?;
+                atomic_write(path, |file| file.write_all(text.as_bytes()))?;
+            }
+            "pdf" => {
+                let bytes = drawing.pdf().map_err(Failure::work)?;
+                atomic_write(path, |file| file.write_all(&bytes))?;
+            }
+            _ => drawing.pixels().map_err(Failure::work)?.write(path)?,
+        }
+        if has_world_file(path) && self.plan.north.is_some() {
+            let map = self.map(words, (&[], ""), steps);
+            let text = world_file(&map, self.size, self.plan)?;
+            atomic_write(path.with_extension("pgw"), |file| {
+                file.write_all(text.as_bytes())
+            })?;
+        }
+        Ok(())
+    }
+}
+
+/// The model as it is seen, with places without a surface.
+struct Seen {
+    width: usize,
+    height: usize,
+    /// Edge of a pixel, in units of the mesh.
+    pixel: f64,
     heights: Vec<f32>,
     normals: Vec<[f32; 3]>,
 }
 
-impl<'a> Seen<'a> {
-    fn new(sensors: &'a Sensors, orientation: &Orientation) -> Option<Self> {
+impl Seen {
+    fn new(sensors: &Sensors, orientation: &Orientation, pixel: f64) -> Option<Self> {
         let Layout::Grid(grid) = &sensors.layout else {
             return None;
         };
@@ -163,7 +213,9 @@ impl<'a> Seen<'a> {
             normals[cell as usize] = local(*normal).map(|x| x as f32);
         }
         Some(Self {
-            grid,
+            width: grid.width,
+            height: grid.height,
+            pixel,
             heights: grid.picture(&heights),
             normals,
         })
@@ -192,7 +244,7 @@ fn world_file(map: &Map<'_>, size: [u32; 2], plan: &Plan<'_>) -> Result<String, 
         let [x, y, _] = own.local(vector);
         [x, y]
     };
-    let bounds = plan.ground.bvh.bounds();
+    let bounds = plan.bvh.bounds();
     let [a, b] = [bounds.min, bounds.max].map(|p| plan.orientation.local(p.map(f64::from)));
     let corner = plan
         .orientation

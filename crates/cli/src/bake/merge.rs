@@ -4,7 +4,7 @@ use antumbra_load::MemorySize;
 use clap::Parser;
 
 use super::chunks::PartFile;
-use super::{ao, sun, visible};
+use super::{ao, factors, horizon, sun, visible};
 use crate::args::{Cli, Command, MergeArgs};
 use crate::exit::Failure;
 
@@ -43,6 +43,14 @@ pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
             (bake.chunks.shard, bake.output, bake.json) = (None, output, json);
             bake.lines.clone_from(&args.lines);
             visible::run(&bake, memory, Some(&parts))
+        }
+        Some(Command::Horizon(mut bake)) => {
+            (bake.chunks.shard, bake.output, bake.json) = (None, output, json);
+            horizon::run(&bake, memory, Some(&parts))
+        }
+        Some(Command::Factors(mut bake)) => {
+            (bake.chunks.shard, bake.output, bake.json) = (None, output, json);
+            factors::run(&bake, memory, Some(&parts))
         }
         _ => Err(Failure::Data(format!("{name}: it was made by no bake"))),
     }

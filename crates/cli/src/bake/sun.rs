@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use antumbra_bake::{
-    Array, Clock, Entry, Error, Label, Layout, Moment, Orientation, Place, Placement, Refraction,
-    Sensors, SunFound, SunJob, SunValues, Sunlight, SunlightClass, TimeStep, UpAxis, Weather,
-    sun_positions,
+    Array, Clock, Entry, Label, Layout, Moment, Place, Sensors, SunFound, SunJob, SunValues,
+    Sunlight, SunlightClass, UpAxis,
 };
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
@@ -16,13 +15,14 @@ use serde::Serialize;
 use super::chunks::{self, PartFile};
 use super::command::{Bake, Head};
 use super::files::{self, Format};
-use super::ground::{self, Ground};
-use super::hourly;
+use super::ground::Ground;
 use super::map::{self, Plan, Words};
-use super::raster;
+use super::places::{self, Places};
+use super::when::{When, read_weather};
+use super::{frames, groups, hourly, raster};
 use crate::args::{Shown, SunArgs};
-use crate::exit::{Failure, say, tell};
-use crate::{input, interrupt, json};
+use crate::exit::{Failure, tell};
+use crate::{interrupt, json};
 
 /// The JSON document.
 #[derive(Serialize)]
@@ -47,6 +47,8 @@ struct Document<'a> {
     mean_sky_view: Option<f64>,
     mean_direct_kwh_m2: Option<f64>,
     mean_diffuse_kwh_m2: Option<f64>,
+    /// Rows of --groups.
+    groups: Option<Vec<groups::Row>>,
     load_seconds: f64,
     build_seconds: f64,
     trace_seconds: f64,
@@ -56,32 +58,47 @@ struct Document<'a> {
 /// Everything that files are made of.
 pub struct Baked<'a> {
     pub ground: &'a Ground,
+    pub places: &'a Places,
     pub sensors: &'a Sensors,
     pub sunlight: &'a Sunlight,
     pub found: &'a SunFound,
     pub args: &'a SunArgs,
-    when: &'a When,
+    pub when: &'a When,
     /// Name of the weather.
     weather: Option<&'a str>,
-    up: UpAxis,
+    pub up: UpAxis,
 }
 
 /// Refuses outputs that cannot be made, before anything is read.
 pub fn check(args: &SunArgs) -> Result<(), Failure> {
     for path in &args.output {
-        if Format::of_sensors(path)? == Format::Picture && args.grid.is_none() {
+        if Format::of_sensors(path)? == Format::Picture && args.places.grid.is_none() {
             let path = path.display();
             return Err(Failure::Usage(format!("{path}: a map needs --grid")));
         }
-        let has_cells = args.grid.is_some() || args.vertices && raster::is_raster(&args.scene);
+        let places = &args.places;
+        let has_cells = match places.seen_from {
+            Some(_) => false,
+            None => places.grid.is_some() || places.vertices && raster::is_raster(&args.scene),
+        };
         if Format::of_sensors(path)? == Format::Raster && !has_cells {
             let path = path.display();
-            let reason =
-                format!("{path}: a raster needs --grid, or --cells of a scene that is one");
+            let reason = format!(
+                "{path}: a raster needs --grid from above, or --cells of a scene that is one"
+            );
             return Err(Failure::Usage(reason));
         }
     }
-    args.placement.check().map_err(Failure::Usage)?;
+    places::check(&args.places)?;
+    if args.frames.is_some() && args.places.grid.is_none() {
+        return Err(Failure::Usage("--frames: maps need --grid".into()));
+    }
+    args.frames
+        .as_deref()
+        .map_or(Ok(()), |path| frames::format(path).map(drop))?;
+    args.groups
+        .as_deref()
+        .map_or(Ok(()), |path| groups::format(path).map(drop))?;
     if args.en17037 {
         check_day(args)?;
     }
@@ -128,12 +145,16 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
         earth: None,
     };
     let read = [
-        ("--sensors", args.sensors.as_deref()),
-        ("--along", args.placement.along.as_deref()),
+        ("--sensors", args.places.sensors.as_deref()),
+        ("--along", args.places.placement.along.as_deref()),
         ("--epw", args.epw.as_deref()),
     ];
     let world_files = map::world_files(&args.output);
-    let mut written = vec![("--hourly", args.hourly.as_deref())];
+    let mut written = vec![
+        ("--hourly", args.hourly.as_deref()),
+        ("--groups", args.groups.as_deref()),
+        ("--frames", args.frames.as_deref()),
+    ];
     written.extend(
         world_files
             .iter()
@@ -144,9 +165,10 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     let when = When::new(args, weather.as_ref())?;
     let steps = when.steps(args, weather.as_ref())?;
     let ground = bake.ground(isa, memory, &mut files)?;
-    let up = ground.up(args.up)?;
+    let up = ground.up(args.places.up)?;
     let sunlight = when.sunlight(args, steps, up)?;
-    let sensors = sensors(args, &ground, up)?;
+    let places = Places::new(&args.places, &ground, up)?;
+    let sensors = &places.sensors;
     let job = SunJob::new(&sensors.points, &sensors.normals, &sunlight)?;
     let done = bake.compute(&job, &ground, &ground.bvh)?;
     let mut document = Document {
@@ -159,7 +181,7 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
             &when,
         )
     };
-    document.describe(&sensors, &sunlight);
+    document.describe(sensors, &sunlight);
     let Some(found) = done.found else {
         document.total_seconds = begin.elapsed().as_secs_f64();
         json::write(&document, args.json.as_ref())?;
@@ -172,7 +194,8 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     };
     let baked = Baked {
         ground: &ground,
-        sensors: &sensors,
+        places: &places,
+        sensors,
         sunlight: &sunlight,
         found: &found,
         args,
@@ -185,6 +208,12 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     }
     if let Some(path) = &args.hourly {
         baked.hourly(path)?;
+    }
+    if let Some(path) = &args.frames {
+        baked.frames(path)?;
+    }
+    if let Some(path) = &args.groups {
+        document.groups = Some(baked.groups(path)?);
     }
     document.rays = job.rays();
     document.fill(&found.values);
@@ -202,169 +231,6 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     bake.tell_done("rays", document.rays, document.trace_seconds);
     chunks::forget(done.checkpoint.as_deref());
     Ok(())
-}
-
-/// The sensors that the command line chooses.
-fn sensors(args: &SunArgs, ground: &Ground, up: UpAxis) -> Result<Sensors, Failure> {
-    let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
-    let units = |metres: f64| metres / args.units.metres();
-    let placement = &args.placement;
-    let mut sensors = if let Some(path) = &args.sensors {
-        ground::sensors(path, ground, &plan)?
-    } else if let Some(path) = &placement.along {
-        let corners = ground::sensors(path, ground, &plan)?;
-        let spacing = units(placement.spacing.unwrap_or_default());
-        let sensors = Sensors::along_lines(&corners, spacing);
-        sensors.map_err(|error| Failure::Usage(format!("--along: {error}")))?
-    } else if let Some(spacing) = placement.surfaces {
-        let options = Placement {
-            spacing: units(spacing),
-            kinds: placement.kinds(),
-            offset: units(placement.offset),
-            storey: placement.storey_height.map(units),
-        };
-        let sensors = Sensors::on_surfaces(&ground.bvh, &ground.mesh, &options, &plan);
-        sensors.map_err(|error| Failure::Usage(format!("--surfaces: {error}")))?
-    } else if let Some(spacing) = args.grid {
-        ground.grid(units(spacing), &plan)?
-    } else {
-        Sensors::of_vertices(&ground.mesh)
-    };
-    if placement.height > 0.0 {
-        let rise = plan.up.map(|x| x * units(placement.height));
-        for point in &mut sensors.points {
-            *point = [0, 1, 2].map(|axis| (f64::from(point[axis]) + rise[axis]) as f32);
-        }
-    }
-    Ok(sensors)
-}
-
-fn read_weather(path: &Path) -> Result<Weather, Failure> {
-    let name = path.display();
-    let weather = Weather::read(&input::text(path)?);
-    let weather =
-        weather.map_err(|bad| Failure::Data(format!("{name}:{}: {}", bad.line, bad.reason)))?;
-    if weather.incomplete > 0 {
-        say(format_args!(
-            "warning: {name}: {} of {} records have no irradiance, which counts as 0",
-            weather.incomplete,
-            weather.records.len()
-        ));
-    }
-    Ok(weather)
-}
-
-/// The beginning of a year.
-fn midnight(year: i32) -> Moment {
-    Moment {
-        year,
-        month: 1,
-        day: 1,
-        seconds: 0.0,
-    }
-}
-
-/// Hours that clocks may be apart from those of the sun. Kashgar in the west of China is the farthest, with 2.9.
-const MOST_APART: f64 = 3.0;
-
-/// The place and its clocks.
-struct When {
-    place: Place,
-    clock: Clock,
-    /// Hours ahead of UTC at the beginning.
-    zone: f64,
-}
-
-impl When {
-    fn new(args: &SunArgs, weather: Option<&Weather>) -> Result<Self, Failure> {
-        let mut place = weather.map(|weather| weather.place).unwrap_or_default();
-        if let (Some(latitude), Some(longitude)) = (args.lat, args.lon) {
-            (place.latitude, place.longitude) = (latitude, longitude);
-        }
-        place.height = args.altitude.unwrap_or(place.height);
-        // Refuses places that are not on the earth, before anything is read.
-        sun_positions(&place, Refraction::default(), &[]).map_err(Failure::usage)?;
-        let by_longitude = (place.longitude / 15.0).round();
-        let clock = match (&args.times.timezone, weather) {
-            (Some(Clock::Zone(_)), Some(_)) => {
-                let reason =
-                    "--timezone: weather has clocks without summer time; give hours ahead of UTC";
-                return Err(Failure::Usage(reason.into()));
-            }
-            (Some(clock), _) => clock.clone(),
-            (None, Some(weather)) => Clock::Fixed(weather.zone),
-            (None, None) => Clock::Fixed(by_longitude),
-        };
-        // Of a time zone, in winter.
-        let january = midnight(args.from.map_or(args.year, |from| from.year));
-        let zone = clock.hours_ahead(clock.unix(&january));
-        let when = Self { place, clock, zone };
-        when.warn_of_clocks();
-        Ok(when)
-    }
-
-    /// Warns of clocks that are far from those of the sun: the time zone or the longitude is probably that of another place.
-    fn warn_of_clocks(&self) {
-        let Self { place, zone, .. } = self;
-        let apart = zone - place.longitude / 15.0;
-        // Some islands are a whole day ahead.
-        let apart = apart - 24.0 * (apart / 24.0).round();
-        if apart.abs() > MOST_APART {
-            say(format_args!(
-                "warning: UTC{zone:+} and the longitude {} are {:.1} hours apart: the sun stands highest at {:.1} o'clock",
-                place.longitude,
-                apart.abs(),
-                12.0 + apart,
-            ));
-        }
-    }
-
-    /// The steps of time that the command line asks for.
-    fn steps(&self, args: &SunArgs, weather: Option<&Weather>) -> Result<Vec<TimeStep>, Failure> {
-        let seconds = 60.0 * args.step;
-        let times = &args.times;
-        if !times.at.is_empty() {
-            let steps = times.at.iter();
-            let steps = steps.map(|&at| TimeStep::around(at, &self.clock, seconds));
-            return Ok(steps.collect());
-        }
-        let period = args.from.zip(args.to).map(|(from, to)| [from, to]);
-        let mut steps = match weather {
-            Some(weather) => weather.steps(self.zone, period),
-            None => {
-                let year = [args.year, args.year + 1].map(midnight);
-                let steps = TimeStep::regular(period.unwrap_or(year), &self.clock, seconds);
-                steps.map_err(|error| match error {
-                    Error::NoTime => Failure::Usage("--to must lie behind --from".into()),
-                    _ => Failure::Usage(format!("--step: {error}")),
-                })?
-            }
-        };
-        steps.retain(|step| times.counts(step.hour(), step.begin.month));
-        if steps.is_empty() {
-            let reason = "--hours, --months: no step of time is left";
-            return Err(Failure::Usage(reason.into()));
-        }
-        Ok(steps)
-    }
-
-    /// Sun and sky in these steps of time.
-    fn sunlight(
-        &self,
-        args: &SunArgs,
-        steps: Vec<TimeStep>,
-        up: UpAxis,
-    ) -> Result<Sunlight, Failure> {
-        let patches = args.sky.patches().map_err(Failure::usage)?;
-        let orientation = Orientation::new(up, args.north).map_err(Failure::usage)?;
-        let is_measured = args.epw.is_some();
-        let sunlight = Sunlight::new(&self.place, steps, is_measured, patches, orientation);
-        let sunlight = sunlight.and_then(|sunlight| match args.min_elevation > 0.0 {
-            true => sunlight.above(args.min_elevation),
-            false => Ok(sunlight),
-        });
-        sunlight.map_err(Failure::usage)
-    }
 }
 
 impl Baked<'_> {
@@ -390,7 +256,7 @@ impl Baked<'_> {
     }
 
     /// Light from the ground, if it is wanted.
-    fn reflected(&self) -> Option<Vec<f64>> {
+    pub fn reflected(&self) -> Option<Vec<f64>> {
         let Sensors {
             points, normals, ..
         } = self.sensors;
@@ -419,7 +285,10 @@ impl Baked<'_> {
             Format::Picture => self.map(path),
             Format::Raster => {
                 let values = (self.sensors, &self.shown()[..]);
-                let place = (self.args.raster.crs.as_ref(), self.args.units.metres());
+                let place = (
+                    self.args.raster.crs.as_ref(),
+                    self.args.places.units.metres(),
+                );
                 raster::write(path, self.ground, values, place, (self.up, self.quantity()))
             }
             Format::Ply | Format::Glb => {
@@ -435,15 +304,27 @@ impl Baked<'_> {
     }
 
     fn map(&self, path: &Path) -> Result<(), Failure> {
-        let (args, metres) = (self.args, self.args.units.metres());
-        let scene = &self.ground.loaded.scene.name;
-        let (quantity, unit) = match args.show {
+        let (quantity, unit) = match self.args.show {
             Shown::Hours => ("Direct sun", "h"),
             Shown::SkyView => ("Sky view factor", ""),
             Shown::Direct => ("Direct irradiation", "kWh/m²"),
             Shown::Diffuse => ("Diffuse irradiation", "kWh/m²"),
             Shown::Total => ("Direct and diffuse irradiation", "kWh/m²"),
         };
+        let time = (self.args.show != Shown::SkyView).then(|| self.period());
+        let words = self.words((quantity, unit), time);
+        let plan = self.plan();
+        let sheet = map::Sheet::new(&self.args.map, &plan, self.sensors)?;
+        sheet.write(path, &words, &self.shown())
+    }
+
+    /// Words on maps of a value at a time.
+    pub fn words(
+        &self,
+        (quantity, unit): (&'static str, &'static str),
+        time: Option<String>,
+    ) -> Words<'_> {
+        let args = self.args;
         let Place {
             latitude,
             longitude,
@@ -454,33 +335,40 @@ impl Baked<'_> {
             Clock::Zone(zone) => zone.iana_name().unwrap_or_default().to_owned(),
             Clock::Fixed(_) => format!("UTC{zone:+}"),
         };
-        let mut subtitle = vec![map::place(latitude, longitude), clock];
-        if args.show != Shown::SkyView {
-            subtitle.insert(0, self.period());
-        }
+        let mut subtitle: Vec<String> = time.into_iter().collect();
+        subtitle.extend([map::place(latitude, longitude), clock]);
         subtitle.extend(self.weather.map(str::to_owned));
-        let words = Words {
-            title: format!("{quantity}, {scene}"),
+        let mut title = format!("{quantity}, {}", self.ground.loaded.scene.name);
+        if let Some(name) = &args.places.only {
+            title += &format!(", {name}");
+        }
+        if let Some(side) = args.places.seen_from {
+            title += &format!(", seen from {}", side.name());
+        }
+        let files = [Some(&args.scene), args.epw.as_ref()];
+        Words {
+            title,
             subtitle: subtitle.join("  ·  "),
             quantity,
             unit,
             whole: false,
-            files: [Some(&args.scene), args.epw.as_ref()]
-                .into_iter()
-                .flatten()
-                .map(PathBuf::as_path)
-                .collect(),
-        };
-        let plan = Plan {
+            files: files.into_iter().flatten().map(PathBuf::as_path).collect(),
+        }
+    }
+
+    /// Where the grid of maps is.
+    pub fn plan(&self) -> Plan<'_> {
+        let places = &self.args.places;
+        let metres = places.units.metres();
+        Plan {
             ground: self.ground,
-            orientation: &Orientation::new(self.up, 0.0).map_err(Failure::usage)?,
+            bvh: self.places.bvh(self.ground),
+            orientation: &self.places.plan,
             up: self.up,
-            cell: args.grid.unwrap_or_default() / metres,
-            north: args.north,
+            cell: places.grid.unwrap_or_default() / metres,
+            north: places.seen_from.is_none().then_some(places.north),
             metres: Some(metres),
-        };
-        let values = (self.sensors, &self.shown()[..]);
-        map::write(path, &args.map, &plan, &words, values)
+        }
     }
 
     /// The time that values are of, as maps write it.
@@ -641,6 +529,7 @@ impl<'a> Document<'a> {
             mean_sky_view: None,
             mean_direct_kwh_m2: None,
             mean_diffuse_kwh_m2: None,
+            groups: None,
             load_seconds: ground.loaded.seconds,
             build_seconds: ground.build_seconds,
             trace_seconds: 0.0,

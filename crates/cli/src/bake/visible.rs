@@ -270,10 +270,11 @@ pub fn run(
     let points = points.unbent(&ground);
     let grid = Plan {
         ground: &ground,
+        bvh: &ground.bvh,
         orientation: &plan,
         up,
         cell: args.grid.unwrap_or_default(),
-        north: 0.0,
+        north: Some(0.0),
         metres: None,
     };
     write(args, &grid, &points, &matrix)?;
@@ -346,7 +347,8 @@ fn write(
                 whole: true,
                 files: vec![&args.scene, &args.from],
             };
-            map::write(path, &args.map, plan, &words, (rows, &values()))
+            let sheet = map::Sheet::new(&args.map, plan, rows)?;
+            sheet.write(path, &words, &values())
         }
         Format::Ply | Format::Glb => {
             let mesh = (&ground.mesh, local);

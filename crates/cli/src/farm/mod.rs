@@ -16,7 +16,7 @@ use clap::Parser;
 use serde::{Deserialize, Serialize};
 
 use crate::args::{Cli, Command, FarmArgs, FarmCommand, FarmJob};
-use crate::bake::{ao, sun, visible};
+use crate::bake::{ao, factors, horizon, sun, visible};
 use crate::exit::Failure;
 use crate::output::{self, Files};
 use crate::render::check_image_names;
@@ -42,6 +42,9 @@ struct Plan {
     #[serde(default)]
     more_outputs: Vec<String>,
     stderr_image: Option<String>,
+    /// Lines of sight.
+    #[serde(default)]
+    lines: Option<String>,
     /// Where parts, scripts and logs go.
     folder: String,
     tasks: u32,
@@ -60,6 +63,10 @@ impl Plan {
             return Err(Failure::Usage("--output is missing".into()));
         };
         match args.job {
+            FarmJob::Render if args.lines.is_some() => {
+                let reason = "--lines: only visible has lines of sight";
+                return Err(Failure::Usage(reason.into()));
+            }
             FarmJob::Render => {
                 check_image_names(Some(output), args.stderr_image.as_deref())?;
                 if !more.is_empty() {
@@ -101,6 +108,7 @@ impl Plan {
                 .map(|path| absolute(path))
                 .collect::<Result<_, _>>()?,
             stderr_image: args.stderr_image.as_deref().map(absolute).transpose()?,
+            lines: args.lines.as_deref().map(absolute).transpose()?,
             folder: absolute(&folder)?,
             tasks: args.tasks,
             flags: args.flags.clone(),
@@ -117,6 +125,9 @@ impl Plan {
         }
         if let Some(path) = &self.stderr_image {
             files.writes("--stderr-image", Path::new(path))?;
+        }
+        if let Some(path) = &self.lines {
+            files.writes("--lines", Path::new(path))?;
         }
         if let Some(path) = template {
             files.writes("--template", path)?;
@@ -172,7 +183,12 @@ impl Plan {
     }
 
     /// Arguments of `merge`.
-    fn merge_args(&self, folder: &str, outputs: &[String], errors: Option<&str>) -> Vec<String> {
+    fn merge_args(
+        &self,
+        folder: &str,
+        outputs: &[String],
+        [errors, lines]: [Option<&str>; 2],
+    ) -> Vec<String> {
         let mut args = vec!["merge".to_owned()];
         args.extend((0..self.tasks).map(|task| format!("{folder}/{task}.part")));
         for output in outputs {
@@ -180,6 +196,9 @@ impl Plan {
         }
         if let Some(path) = errors {
             args.extend(["--stderr-image".into(), path.into()]);
+        }
+        if let Some(path) = lines {
+            args.extend(["--lines".into(), path.into()]);
         }
         args
     }
@@ -204,6 +223,8 @@ fn check_bake(args: &FarmArgs) -> Result<(), Failure> {
         Some(Command::Ao(bake)) => (1, bake.json),
         Some(Command::Sun(bake)) => (bake.output.len(), bake.json),
         Some(Command::Visible(bake)) => (bake.output.len(), bake.json),
+        Some(Command::Horizon(bake)) => (bake.output.len(), bake.json),
+        Some(Command::Factors(bake)) => (bake.output.len(), bake.json),
         _ => {
             return Err(Failure::Usage(
                 "flags after -- belong to the command".into(),
@@ -218,10 +239,19 @@ fn check_bake(args: &FarmArgs) -> Result<(), Failure> {
     for path in &args.output {
         whole.extend(["-o".into(), path.clone().into_os_string()]);
     }
+    if let Some(path) = &args.lines {
+        if args.job != FarmJob::Visible {
+            let reason = "--lines: only visible has lines of sight";
+            return Err(Failure::Usage(reason.into()));
+        }
+        whole.extend(["--lines".into(), path.clone().into_os_string()]);
+    }
     match parse(&whole)?.command {
         Some(Command::Ao(bake)) => ao::check(&bake).map(drop),
         Some(Command::Sun(bake)) => sun::check(&bake),
         Some(Command::Visible(bake)) => visible::check(&bake),
+        Some(Command::Horizon(bake)) => horizon::check(&bake),
+        Some(Command::Factors(bake)) => factors::check(&bake),
         _ => Ok(()),
     }
 }

@@ -46,6 +46,7 @@ fn check_texts(plan: &Plan) -> Result<(), Failure> {
         output,
         more_outputs,
         stderr_image,
+        lines,
         folder,
         tasks: _,
         flags,
@@ -56,7 +57,11 @@ fn check_texts(plan: &Plan) -> Result<(), Failure> {
         )));
     }
     let paths = [program, scene, output, folder].into_iter();
-    let mut texts = paths.chain(more_outputs).chain(stderr_image).chain(flags);
+    let mut texts = paths
+        .chain(more_outputs)
+        .chain(stderr_image)
+        .chain(lines)
+        .chain(flags);
     match texts.find(|text| text.contains(char::is_control)) {
         Some(text) => Err(Failure::Usage(format!(
             "{text:?}: control characters cannot stand in a template"
@@ -105,6 +110,10 @@ fn template(plan: &Plan, built_in: bool, directory: &Path) -> Value {
         parameters.push(path("StderrImage", "FILE", "OUT", image));
         "{{Param.StderrImage}}"
     });
+    let lines = plan.lines.as_ref().map(|file| {
+        parameters.push(path("Lines", "FILE", "OUT", file));
+        "{{Param.Lines}}"
+    });
     let mut outputs = vec!["{{Param.Output}}".to_owned()];
     for (index, output) in plan.more_outputs.iter().enumerate() {
         let name = format!("Output{}", index + 2);
@@ -131,7 +140,7 @@ fn template(plan: &Plan, built_in: bool, directory: &Path) -> Value {
             {
                 "name": "Merge",
                 "dependencies": [{ "dependsOn": step }],
-                "script": action(plan.merge_args(folder, &outputs, errors)),
+                "script": action(plan.merge_args(folder, &outputs, [errors, lines])),
             },
         ],
     })

@@ -221,7 +221,11 @@ exec {call}
             attempts = args.attempts,
             call = call(
                 plan,
-                &plan.merge_args(folder, &plan.outputs(), plan.stderr_image.as_deref())
+                &plan.merge_args(
+                    folder,
+                    &plan.outputs(),
+                    [plan.stderr_image.as_deref(), plan.lines.as_deref()],
+                )
             )?,
         ))
     }

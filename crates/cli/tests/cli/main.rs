@@ -8,6 +8,7 @@
 //! - `outputs`: what outputs may replace: never an input, another output or a stranger's file
 //! - `rendering`: `render` and what it promises about its picture
 //! - `resuming`: interruptions, parts, learned orders, farms
+//! - `killing`: bakes that are killed and go on
 //! - `signals`: TERM, INT and USR1 at any moment
 //! - `studying`: `study`, row by row
 //! - `benching`: `bench`, with and without Embree
@@ -15,6 +16,7 @@
 //! - `looking`: viewers, what is said meanwhile, and the standard input
 //! - `occlusion`: `ao`;  `sunlight`: `sun`;  `sight`: `visible`
 //! - `terrain`: height rasters and viewsheds;  `placing`: sensors on surfaces, and times of `sun`
+//! - `grouping`: results by object and facade, elevations, moving shadows; `horizon`, `factors`
 //! - `book`: links, tables and code of the pages for readers
 //! - `looks`: meshes with materials, camera flags, layers, pictures for displays
 //! - `cameras`: cameras in `info` and `ao`, and light from images around a mesh
@@ -29,8 +31,10 @@ mod cameras;
 mod damaged;
 mod describing;
 mod farming;
+mod grouping;
 mod images;
 mod inputs;
+mod killing;
 mod looking;
 mod looks;
 mod occlusion;

@@ -1,0 +1,101 @@
+//! Moving shadows: `sun --frames`.
+
+use std::path::{Path, PathBuf};
+
+use antumbra_bake::{Hourly, Moment};
+use antumbra_image::atomic_write;
+use antumbra_map::{Animation, Drawing, Steps};
+
+use super::map;
+use super::sun::Baked;
+use crate::exit::Failure;
+use crate::interrupt;
+
+/// Most maps of a command. A day in steps of a minute has fewer.
+const MOST: usize = 1500;
+
+/// Time that a map is shown.
+const SECONDS: f32 = 0.2;
+
+/// Whether a file of moving shadows is a .gif; otherwise maps are .png.
+pub fn format(path: &Path) -> Result<bool, Failure> {
+    let extension = path.extension().unwrap_or_default();
+    match ["gif", "png"].map(|known| extension.eq_ignore_ascii_case(known)) {
+        [true, _] => Ok(true),
+        [_, true] => Ok(false),
+        _ => {
+            let path = path.display();
+            let reason = format!("{path}: moving shadows are written as gif or png");
+            Err(Failure::Usage(reason))
+        }
+    }
+}
+
+/// Name of a map among many.
+fn numbered(path: &Path, number: usize) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}-{number:04}.png"))
+}
+
+impl Baked<'_> {
+    /// Writes a map for each step of time with a sun: as a .gif, or as numbered .png files.
+    pub fn frames(&self, path: &Path) -> Result<(), Failure> {
+        let _writing = interrupt::writing();
+        let hourly = Hourly::new(self.sunlight)?;
+        let suns = &self.sunlight.suns;
+        let steps: Vec<usize> = (0..hourly.len())
+            .filter(|&step| hourly.sun(step).is_some())
+            .collect();
+        if steps.is_empty() || steps.len() > MOST {
+            let found = steps.len();
+            let reason = format!(
+                "--frames: {found} steps of time have a sun, wanted 1 to {MOST}; choose a day with --from and --to"
+            );
+            return Err(Failure::Usage(reason));
+        }
+        let plan = self.plan();
+        let sheet = map::Sheet::new(&self.args.map, &plan, self.sensors)?;
+        let draw = |step: usize| -> Result<Drawing, Failure> {
+            let sun = hourly.sun(step).unwrap_or_default();
+            let lit = (0..self.sensors.points.len()).map(|row| {
+                let is_lit = self.found.suns_seen.get(row, sun);
+                if is_lit { 1.0 } else { 0.0 }
+            });
+            let lit: Vec<f32> = lit.collect();
+            let begin = hourly.begin(step).unix(0.0);
+            let middle = Moment::at_unix(begin + 1800.0 * suns.hours[sun], 0.0);
+            let words = self.words(("Sunlight", ""), Some(middle.to_string()));
+            sheet.draw(&words, &lit, Steps::named(&["shadow", "sun"]))
+        };
+        if !format(path)? {
+            for (index, &step) in steps.iter().enumerate() {
+                interrupt::check()?;
+                let pixels = draw(step)?.pixels().map_err(Failure::work)?;
+                pixels.write(&numbered(path, index + 1))?;
+            }
+            return Ok(());
+        }
+        let mut animation = Animation::new(SECONDS);
+        for &step in &steps {
+            interrupt::check()?;
+            let pixels = draw(step)?.pixels().map_err(Failure::work)?;
+            animation.add(&pixels).map_err(Failure::work)?;
+        }
+        let bytes = animation.finish().map_err(Failure::work)?;
+        Ok(atomic_write(path, |file| file.write_all(&bytes))?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn maps_are_numbered_in_the_folder_of_the_name() {
+        let name = numbered(Path::new("out/a.b.png"), 7);
+        assert_eq!(name, Path::new("out/a.b-0007.png"));
+        assert!(format(Path::new("a.GIF")).expect("a format"));
+        assert!(!format(Path::new("a.png")).expect("a format"));
+        assert!(format(Path::new("a.mp4")).is_err());
+    }
+}

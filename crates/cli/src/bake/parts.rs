@@ -1,0 +1,104 @@
+//! Names of the triangles of a scene: objects and materials.
+
+use antumbra_bake::Mesh;
+use antumbra_load::{Names, Part};
+use antumbra_scene::{Geometry, Scene};
+
+/// Names of all triangles of a scene without instances, in the order of its mesh.
+pub struct Parts {
+    /// Names, with the end of the run of triangles that have them.
+    runs: Vec<(usize, Part)>,
+    /// First triangle of each shape, and its number of triangles.
+    shapes: Vec<[u32; 2]>,
+}
+
+impl Parts {
+    /// Names of the shapes of a flattened scene, as far as the file has any.
+    pub fn new(scene: &Scene, names: &Names) -> Self {
+        let named = names.flattened();
+        let has_names = named.len() == scene.shapes.len();
+        let (mut runs, mut shapes, mut end) = (Vec::new(), Vec::new(), 0);
+        for (index, shape) in scene.shapes.iter().enumerate() {
+            let count = match &shape.geometry {
+                Geometry::Mesh(mesh) => mesh.indices.len(),
+                Geometry::Sphere(_) => 0,
+            };
+            shapes.push([end as u32, count as u32]);
+            let of_shape = named.get(index).filter(|_| has_names).into_iter().flatten();
+            let of_shape: Vec<&Part> = of_shape.collect();
+            if of_shape.iter().map(|part| part.triangles).sum::<usize>() == count {
+                for part in of_shape {
+                    end += part.triangles;
+                    runs.push((end, part.clone()));
+                }
+            } else {
+                end += count;
+                runs.push((end, Part::default()));
+            }
+        }
+        Self { runs, shapes }
+    }
+
+    /// Names of a triangle.
+    pub fn part(&self, triangle: usize) -> Option<&Part> {
+        let run = self.runs.partition_point(|(end, _)| *end <= triangle);
+        self.runs.get(run).map(|(_, part)| part)
+    }
+
+    /// Triangle of the mesh from its shape and its number there.
+    pub fn flat(&self, [shape, triangle]: [u32; 2]) -> Option<u32> {
+        let [first, count] = *self.shapes.get(shape as usize)?;
+        (triangle < count).then_some(first + triangle)
+    }
+
+    /// Whether a triangle has the name of a material.
+    pub fn has_materials(&self) -> bool {
+        self.runs.iter().any(|(_, part)| !part.material.is_empty())
+    }
+
+    /// Names of the objects of all triangles. Without names in the file, connected bodies are objects.
+    pub fn objects<'a>(&'a self, mesh: &Mesh) -> Objects<'a> {
+        let has_names = self.runs.iter().any(|(_, part)| !part.object.is_empty());
+        Objects {
+            parts: self,
+            bodies: (!has_names).then(|| mesh.bodies()),
+        }
+    }
+}
+
+/// Names of objects.
+pub struct Objects<'a> {
+    parts: &'a Parts,
+    /// Number of the body of each triangle, where nothing has a name.
+    bodies: Option<Vec<u32>>,
+}
+
+impl Objects<'_> {
+    /// Name of the object of a triangle: `body 1` and so on where the file has no names, and empty for the rest of those that have.
+    pub fn name(&self, triangle: usize) -> String {
+        match &self.bodies {
+            Some(bodies) => format!("body {}", bodies[triangle] + 1),
+            None => {
+                (self.parts.part(triangle)).map_or_else(String::new, |part| part.object.clone())
+            }
+        }
+    }
+
+    /// Some of the names.
+    pub fn some(&self, count: usize) -> Vec<String> {
+        if let Some(bodies) = &self.bodies {
+            let all = bodies.iter().max().map_or(0, |&last| last as usize + 1);
+            return (1..=all.min(count)).map(|i| format!("body {i}")).collect();
+        }
+        let mut names: Vec<&String> = self
+            .parts
+            .runs
+            .iter()
+            .map(|(_, part)| &part.object)
+            .collect();
+        names.sort_unstable();
+        names.dedup();
+        names.retain(|name| !name.is_empty());
+        names.into_iter().take(count).cloned().collect()
+    }
+}

@@ -1,0 +1,455 @@
+//! Results by object, material and facade; elevations, moving shadows, horizons and view factors.
+
+use std::fs;
+
+use crate::support::Place;
+
+/// Two houses of 10 x 10 x 6 m beside each other on a ground of 60 x 60 m, z up.
+fn village() -> Place {
+    let mut text = String::from("o ground\nusemtl grass\n");
+    text += "v -30 -30 0\nv 30 -30 0\nv 30 30 0\nv -30 30 0\nf 1 2 3 4\n";
+    for (index, (name, x)) in [("mill", -20), ("school hall", 5)].iter().enumerate() {
+        let first = 5 + 8 * index;
+        for z in [0, 6] {
+            for [dx, y] in [[0, -5], [10, -5], [10, 5], [0, 5]] {
+                text += &format!("v {} {y} {z}\n", x + dx);
+            }
+        }
+        let at = |corner: usize| first + corner;
+        text += &format!("o {name}\nusemtl tiles\n");
+        text += &format!("f {} {} {} {}\nusemtl brick\n", at(4), at(5), at(6), at(7));
+        for [a, b] in [[0, 1], [1, 2], [2, 3], [3, 0]] {
+            text += &format!("f {} {} {} {}\n", at(a), at(b), at(b + 4), at(a + 4));
+        }
+    }
+    let place = Place::empty();
+    place.write("village.obj", text);
+    place
+}
+
+const DAY: [&str; 12] = [
+    "--lat",
+    "48.2",
+    "--lon",
+    "16.4",
+    "--from",
+    "2025-06-21",
+    "--to",
+    "2025-06-21",
+    "--up",
+    "z",
+    "--step",
+    "30",
+];
+
+fn table(place: &Place, name: &str) -> Vec<Vec<String>> {
+    let text = fs::read_to_string(place.path(name)).expect("a table");
+    let fields = |line: &str| line.split(',').map(str::to_owned).collect();
+    text.lines().map(fields).collect()
+}
+
+#[test]
+fn facades_and_materials_have_areas_and_means() {
+    let place = village();
+    let flags = [
+        "sun",
+        "village.obj",
+        "-o",
+        "sun.csv",
+        "--surfaces",
+        "1",
+        "--offset",
+        "0.1",
+    ];
+    let facades = [
+        "--groups",
+        "facades.csv",
+        "--by",
+        "facade",
+        "--json",
+        "sun.json",
+    ];
+    place.run(&[&flags[..], &facades, &DAY].concat()).expect(0);
+    let rows = table(&place, "facades.csv");
+    let head = "object,facade,area_m2,sensors,hours_mean,hours_min,hours_max,sky_view_mean,sky_view_min,sky_view_max";
+    assert_eq!(rows[0].join(","), head);
+    // The ground below the houses counts as roof or ground by what is below: it is one plane.
+    let names: Vec<String> = rows[1..].iter().map(|row| row[..4].join(" ")).collect();
+    let wanted = [
+        "ground ground 3600.0 3600",
+        "mill roof 100.0 100",
+        "school hall roof 100.0 100",
+        "mill S 60.0 60",
+        "mill E 60.0 60",
+        "mill N 60.0 60",
+        "mill W 60.0 60",
+        "school hall S 60.0 60",
+        "school hall E 60.0 60",
+        "school hall N 60.0 60",
+        "school hall W 60.0 60",
+    ];
+    assert_eq!(names, wanted);
+    let hours = |index: usize| rows[index][4].parse::<f64>().expect("a number");
+    let (south, north) = (hours(4), hours(6));
+    assert!(south > north && north > 0.5, "{south} {north}");
+    assert!(hours(2) > 14.0, "roofs are open");
+    // The same lines as JSON, and means that the sensors give.
+    let document = place.json("sun.json");
+    assert_eq!(document["groups"][3]["facade"], "S");
+    let sensors = table(&place, "sun.csv");
+    let at = |name: &str| {
+        sensors[0]
+            .iter()
+            .position(|other| other == name)
+            .expect("a column")
+    };
+    let number = |row: &[String], column: usize| row[column].parse::<f64>().expect("a number");
+    let own = sensors[1..]
+        .iter()
+        .filter(|row| number(row, at("ny")) < -0.9 && number(row, at("x")) < 0.0);
+    let own: Vec<f64> = own.map(|row| number(row, at("hours"))).collect();
+    assert_eq!(own.len(), 60);
+    let mean = own.iter().sum::<f64>() / 60.0;
+    assert!((mean - south).abs() < 1e-5, "{mean} {south}");
+
+    let materials = ["--groups", "materials.json", "--by", "material"];
+    place
+        .run(&[&flags[..], &materials, &DAY].concat())
+        .expect(0);
+    let found = place.json("materials.json");
+    let areas: Vec<f64> = (0..3)
+        .map(|i| found[i]["area_m2"].as_f64().expect("an area"))
+        .collect();
+    assert_eq!(areas, [3600.0, 200.0, 480.0]);
+    assert_eq!(found[1]["material"], "tiles");
+}
+
+#[test]
+fn energies_are_means_times_areas() {
+    let place = village();
+    let mut weather = String::new();
+    weather += "LOCATION,Here,-,-,-,-,48.2,16.4,1.0,170\n";
+    for line in 1..7 {
+        weather += &format!("LINE {line}\n");
+    }
+    weather += "DATA PERIODS,1,1,Data,Sunday,6/21,6/21\n";
+    for hour in 1..=24 {
+        let mut fields = vec!["0".to_owned(); 35];
+        for (index, value) in [2025, 6, 21, hour, 60].iter().enumerate() {
+            fields[index] = value.to_string();
+        }
+        let is_day = (6..=19).contains(&hour);
+        (fields[14], fields[15]) = match is_day {
+            true => ("500".into(), "100".into()),
+            false => ("0".into(), "0".into()),
+        };
+        weather += &(fields.join(",") + "\n");
+    }
+    place.write("day.epw", weather);
+    let flags = [
+        "sun",
+        "village.obj",
+        "-o",
+        "sun.csv",
+        "--grid",
+        "2",
+        "--epw",
+        "day.epw",
+        "--up",
+        "z",
+    ];
+    place
+        .run(&[&flags[..], &["--groups", "objects.csv"]].concat())
+        .expect(0);
+    let rows = table(&place, "objects.csv");
+    let at = |name: &str| {
+        rows[0]
+            .iter()
+            .position(|other| other == name)
+            .expect("a column")
+    };
+    for row in &rows[1..] {
+        let number = |name: &str| row[at(name)].parse::<f64>().expect("a number");
+        let energy = number("area_m2") * number("diffuse_kwh_m2_mean");
+        assert!((energy - number("diffuse_kwh")).abs() < 1e-2 && energy > 0.0);
+    }
+}
+
+#[test]
+fn objects_that_are_not_there_are_named() {
+    let place = village();
+    let flags = ["sun", "village.obj", "-o", "sun.csv", "--grid", "2"];
+    let run = place.run(&[&flags[..], &["--only", "barn"], &DAY].concat());
+    run.expect(2);
+    assert!(
+        run.stderr.contains("some are ground, mill, school hall"),
+        "{}",
+        run.stderr
+    );
+    place
+        .run(&[&flags[..], &["--by", "facade"], &DAY].concat())
+        .expect(2);
+    place
+        .run(&[&flags[..], &["--groups", "a.txt"], &DAY].concat())
+        .expect(2);
+    place.write("plain.obj", "v 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n");
+    let flags = [
+        "sun",
+        "plain.obj",
+        "-o",
+        "sun.csv",
+        "--grid",
+        "2",
+        "--groups",
+        "a.csv",
+    ];
+    let run = place.run(&[&flags[..], &["--by", "material"], &DAY].concat());
+    run.expect(65);
+    assert!(
+        run.stderr.contains("no material of the scene has a name"),
+        "{}",
+        run.stderr
+    );
+    let run = place.run(&[&flags[..], &["--only", "body 2"], &DAY].concat());
+    assert!(run.stderr.contains("some are body 1"), "{}", run.stderr);
+}
+
+#[test]
+fn elevations_show_one_side_of_one_object() {
+    let place = village();
+    let flags = ["sun", "village.obj", "--grid", "1", "--seen-from", "south"];
+    let outputs = [
+        "-o",
+        "south.png",
+        "-o",
+        "south.csv",
+        "--only",
+        "mill",
+        "--resolution",
+        "640x480",
+    ];
+    place.run(&[&flags[..], &outputs, &DAY].concat()).expect(0);
+    let rows = table(&place, "south.csv");
+    let column = |name: &str| {
+        rows[0]
+            .iter()
+            .position(|other| other == name)
+            .expect("a column")
+    };
+    assert_eq!(rows.len(), 1 + 60, "10 x 6 squares");
+    for row in &rows[1..] {
+        let number = |name: &str| row[column(name)].parse::<f64>().expect("a number");
+        assert_eq!([number("y"), number("ny")], [-5.0, -1.0]);
+        assert!(number("x") < -9.0);
+    }
+    assert!(
+        !place.path("south.pgw").exists(),
+        "an elevation is on no map"
+    );
+    let run = place.run(&[&flags[..], &["-o", "a.tif"], &DAY].concat());
+    run.expect(2);
+    assert!(
+        run.stderr.contains("a raster needs --grid from above"),
+        "{}",
+        run.stderr
+    );
+    // From above, the same object has the sensors of its roof.
+    let above = [
+        "sun",
+        "village.obj",
+        "--grid",
+        "1",
+        "--only",
+        "mill",
+        "-o",
+        "roof.csv",
+    ];
+    place.run(&[&above[..], &DAY].concat()).expect(0);
+    assert_eq!(table(&place, "roof.csv").len(), 1 + 100);
+}
+
+#[test]
+fn shadows_move_in_one_file_or_in_many() {
+    let place = village();
+    let flags = [
+        "sun",
+        "village.obj",
+        "--grid",
+        "2",
+        "-o",
+        "sun.csv",
+        "--resolution",
+        "400x360",
+    ];
+    let times = ["--hours", "9-12", "--step", "60"];
+    let day = &DAY[..10];
+    place
+        .run(&[&flags[..], &["--frames", "day.gif"], &times, day].concat())
+        .expect(0);
+    let gif = fs::read(place.path("day.gif")).expect("a picture");
+    assert_eq!(&gif[..6], b"GIF89a");
+    // Graphic control extensions, one for each picture.
+    let controls = gif
+        .windows(3)
+        .filter(|bytes| *bytes == [0x21, 0xf9, 4])
+        .count();
+    assert_eq!(controls, 3);
+    place
+        .run(&[&flags[..], &["--frames", "day.png"], &times, day].concat())
+        .expect(0);
+    let pictures = place
+        .files()
+        .into_iter()
+        .filter(|name| name.starts_with("day-"));
+    let pictures: Vec<String> = pictures.collect();
+    assert_eq!(pictures, ["day-0001.png", "day-0002.png", "day-0003.png"]);
+    let [first, last] = [0, 2].map(|i| fs::read(place.path(&pictures[i])).expect("a picture"));
+    assert_ne!(first, last);
+    place
+        .run(&[&flags[..], &["--frames", "day.mp4"], &times, day].concat())
+        .expect(2);
+    let night = ["--hours", "0-2", "--step", "60"];
+    let run = place.run(&[&flags[..], &["--frames", "day.gif"], &night, day].concat());
+    assert!(
+        run.stderr.contains("0 steps of time have a sun"),
+        "{}",
+        run.stderr
+    );
+}
+
+#[test]
+fn horizons_by_rays_and_of_cells_agree_and_shares_change_no_byte() {
+    let place = Place::empty();
+    // A wall of 9 m along the east of a plain of 40 x 40 cells of 1 m.
+    let mut asc =
+        String::from("ncols 40\nnrows 40\nxllcorner 600000\nyllcorner 5340000\ncellsize 1\n");
+    for _ in 0..40 {
+        let row: Vec<&str> = (0..40)
+            .map(|column| if column == 35 { "9" } else { "0" })
+            .collect();
+        asc += &(row.join(" ") + "\n");
+    }
+    place.write("wall.asc", asc);
+    let flags = ["horizon", "wall.asc", "--azimuths", "8"];
+    let cells = [&flags[..], &["--cells"]].concat();
+    place
+        .run(&[&cells[..], &["-o", "cells.csv", "-o", "cells.npz"]].concat())
+        .expect(0);
+    let rows = table(&place, "cells.csv");
+    let names = "x,y,z,horizon_000,horizon_045,horizon_090,horizon_135,horizon_180,horizon_225,horizon_270,horizon_315";
+    assert_eq!(rows[0].join(","), names);
+    let row = &rows[1 + 20 * 40 + 20];
+    let number = |column: usize| row[column].parse::<f64>().expect("a number");
+    assert_eq!([number(0), number(1)], [600_020.5, 5_340_019.5]);
+    // The crest is 15 m away.
+    for (column, distance) in [(5, 15.0), (4, 15.0 * 2_f64.sqrt())] {
+        let wanted = (9.0 / distance).atan().to_degrees();
+        assert!(
+            (number(column) - wanted).abs() < 1e-3,
+            "{} for {wanted}",
+            number(column)
+        );
+    }
+    assert_eq!([number(3), number(9)], [0.0, 0.0]);
+    place.write("eye.csv", "x,y,z,nx,ny,nz\n600020.5,5340019.5,0,0,0,1\n");
+    let sensors = [&flags[..], &["--sensors", "eye.csv", "-o", "eye.csv.csv"]].concat();
+    place.run(&sensors).expect(0);
+    let by_rays = &table(&place, "eye.csv.csv")[1];
+    for column in 3..11 {
+        let own = by_rays[column + 3].parse::<f64>().expect("a number");
+        assert!(
+            (own - number(column)).abs() < 2e-3,
+            "{own} {}",
+            number(column)
+        );
+    }
+    for share in ["0/3", "1/3", "2/3"] {
+        let part = format!("{}.part", &share[..1]);
+        place
+            .run(&[&cells[..], &["--shard", share, "-o", &part]].concat())
+            .expect(0);
+    }
+    place
+        .run(&["merge", "0.part", "1.part", "2.part", "-o", "merged.npz"])
+        .expect(0);
+    let read = |name: &str| fs::read(place.path(name)).expect("a file");
+    assert!(read("merged.npz") == read("cells.npz"));
+    // A raster has one azimuth.
+    place
+        .run(&[&cells[..], &["-o", "a.tif"]].concat())
+        .expect(2);
+    let one = [
+        "horizon",
+        "wall.asc",
+        "--cells",
+        "--azimuths",
+        "1",
+        "--first",
+        "90",
+        "-o",
+        "east.tif",
+    ];
+    place.run(&one).expect(0);
+}
+
+#[test]
+fn view_factors_of_a_box_are_those_of_the_catalogue() {
+    let place = Place::empty();
+    let mut text = String::new();
+    for z in [0, 1] {
+        for [x, y] in [[0, 0], [2, 0], [2, 3], [0, 3]] {
+            text += &format!("v {x} {y} {z}\n");
+        }
+    }
+    // All sides face inwards.
+    for (name, face) in [
+        ("floor", "1 2 3 4"),
+        ("ceiling", "5 8 7 6"),
+        ("south", "1 5 6 2"),
+        ("east", "2 6 7 3"),
+        ("north", "3 7 8 4"),
+        ("west", "4 8 5 1"),
+    ] {
+        text += &format!("o {name}\nf {face}\n");
+    }
+    place.write("box.obj", text);
+    let flags = ["factors", "box.obj", "--up", "z"];
+    place
+        .run(&[&flags[..], &["-o", "factors.csv", "-o", "factors.npz"]].concat())
+        .expect(0);
+    let rows = table(&place, "factors.csv");
+    let names = "object,area,to floor,to ceiling,to south,to east,to north,to west,to nowhere";
+    assert_eq!(rows[0].join(","), names);
+    let number = |row: usize, column: usize| rows[row][column].parse::<f64>().expect("a number");
+    assert_eq!([number(1, 1), number(3, 1), number(4, 1)], [6.0, 2.0, 3.0]);
+    // C-11 of Howell's catalogue for two rectangles of 2 x 3 in the distance 1.
+    let (x, y) = (2.0_f64, 3.0_f64);
+    let (p, q) = ((1.0 + x * x).sqrt(), (1.0 + y * y).sqrt());
+    let sum = (p * q / (1.0 + x * x + y * y).sqrt()).ln()
+        + x * q * (x / q).atan()
+        + y * p * (y / p).atan()
+        - x * x.atan()
+        - y * y.atan();
+    let wanted = 2.0 / (std::f64::consts::PI * x * y) * sum;
+    assert!(
+        (number(1, 3) - wanted).abs() < 1e-3,
+        "{} for {wanted}",
+        number(1, 3)
+    );
+    for row in 1..7 {
+        let sum: f64 = (2..9).map(|column| number(row, column)).sum();
+        assert!((sum - 1.0).abs() < 1e-5, "the sum rule: {sum}");
+        assert_eq!(number(row, 8), 0.0, "the box is closed");
+    }
+    for share in ["0/2", "1/2"] {
+        let part = format!("{}.part", &share[..1]);
+        place
+            .run(&[&flags[..], &["--shard", share, "-o", &part]].concat())
+            .expect(0);
+    }
+    place
+        .run(&["merge", "1.part", "0.part", "-o", "merged.npz"])
+        .expect(0);
+    let read = |name: &str| fs::read(place.path(name)).expect("a file");
+    assert!(read("merged.npz") == read("factors.npz"));
+}
