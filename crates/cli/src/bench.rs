@@ -75,7 +75,7 @@ pub fn run(args: &BenchArgs, memory: MemorySize) -> Result<(), Failure> {
     Ok(results.end()?)
 }
 
-/// The library asked for. A missing one is mentioned once.
+/// The library that the command line names. A missing one is reported once.
 fn load_embree(args: &BenchArgs) -> Result<Option<Embree>, Failure> {
     let named = || std::env::var_os(VARIABLE).filter(|path| !path.is_empty());
     match args.embree.clone().or_else(|| named().map(PathBuf::from)) {

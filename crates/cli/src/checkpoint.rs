@@ -116,7 +116,7 @@ impl<'a> Keeper<'a> {
         self
     }
 
-    /// Identity of the rendering. Worked out on first use, because large scenes take time.
+    /// Identity of the rendering. Computed on first use, because large scenes take time.
     pub fn identity(&self) -> &Identity {
         self.identity
             .get_or_init(|| Identity::new(self.scene, self.options))

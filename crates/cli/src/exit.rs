@@ -1,4 +1,4 @@
-//! How the program ends when it cannot do what was asked, and how it speaks to people.
+//! How the program ends after an error, and how it prints messages.
 
 use std::fmt;
 use std::io::{self, IsTerminal, Write};
@@ -15,7 +15,7 @@ pub enum Failure {
     /// Something went wrong while working: code 1.
     #[error("error: {0}")]
     Work(String),
-    /// The command line asks for what does not exist: code 2, as for what clap finds.
+    /// The command line names something that does not exist: code 2, as for errors that clap finds.
     #[error("error: {0}")]
     Usage(String),
     /// The scene is bad: code 65 (`EX_DATAERR`). Holds every message about it.
@@ -158,7 +158,7 @@ impl From<antumbra_lab::Error> for Failure {
 /// How much is said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Loudness {
-    /// Errors and warnings alone: `-q`.
+    /// Only errors and warnings: `-q`.
     Quiet,
     /// The usual.
     Usual,
@@ -167,7 +167,7 @@ pub enum Loudness {
 }
 
 static LOUDNESS: AtomicU8 = AtomicU8::new(Loudness::Usual as u8);
-/// Whether a line about progress stands on the terminal.
+/// Whether the terminal shows a line about progress.
 static DRAWN: Mutex<bool> = Mutex::new(false);
 
 /// Sets how much is said.
@@ -190,7 +190,7 @@ pub fn is_terminal() -> bool {
     io::stderr().is_terminal()
 }
 
-/// Says an error, a warning, or what was asked for. On a terminal long lines are broken between words. Nobody may be
+/// Prints an error, a warning, or a requested text. On a terminal long lines are broken between words. Nobody may be
 /// listening: failing to say it is no failure.
 pub fn say(text: fmt::Arguments<'_>) {
     let mut drawn = DRAWN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -203,14 +203,14 @@ pub fn say(text: fmt::Arguments<'_>) {
     };
 }
 
-/// Tells people how it goes, unless they want quiet.
+/// Prints a message about the work, unless `-q` is given.
 pub fn tell(text: fmt::Arguments<'_>) {
     if !is_quiet() {
         say(text);
     }
 }
 
-/// Tells people details, if they want them.
+/// Prints a detail, if `-v` is given.
 pub fn detail(text: fmt::Arguments<'_>) {
     if is_verbose() {
         say(text);

@@ -24,7 +24,7 @@ struct Document {
     #[serde(flatten)]
     machine: Machine,
     scene: String,
-    /// Shapes, triangles and spheres in the world: those of an object count once for every instance.
+    /// Shapes, triangles and spheres in the world. An object counts once for every instance.
     shapes: usize,
     triangles: usize,
     spheres: usize,

@@ -1,4 +1,4 @@
-//! Signals. Ctrl-C (SIGINT) and SIGTERM ask for an orderly end, and a second one ends at once. SIGUSR1 asks for a
+//! Signals. Ctrl-C (SIGINT) and SIGTERM request an orderly end, and a second one ends at once. SIGUSR1 requests a
 //! checkpoint.
 //!
 //! An orderly end waits for nothing but files that are being written: where a run does not look at the flag for some
@@ -111,13 +111,13 @@ pub fn requested() -> bool {
     INTERRUPTED.load(Ordering::Relaxed)
 }
 
-/// Whether a checkpoint was asked for since this was last asked.
+/// Whether a checkpoint was requested since the last call.
 pub fn checkpoint_requested() -> bool {
     // Without the first look every thread would write to the flag all the time.
     CHECKPOINT.load(Ordering::Relaxed) && CHECKPOINT.swap(false, Ordering::Relaxed)
 }
 
-/// Ends here if that was asked for.
+/// Returns [`Failure::Interrupted`] if a signal has requested the end.
 pub fn check() -> Result<(), Failure> {
     if requested() {
         Err(Failure::Interrupted)

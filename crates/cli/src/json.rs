@@ -30,7 +30,7 @@ impl FromStr for Destination {
 }
 
 impl Destination {
-    /// The path; that of the standard output for `-`.
+    /// The path of the file; `/dev/stdout` for `-`.
     pub fn path(&self) -> &Path {
         match self {
             Self::Stdout => Path::new("/dev/stdout"),
@@ -39,7 +39,7 @@ impl Destination {
     }
 }
 
-/// Writes a document where it was asked for, if it was.
+/// Writes a document to the file of the flag, if there is one.
 pub fn write(document: &impl Serialize, to: Option<&Destination>) -> Result<(), Failure> {
     match to {
         None => Ok(()),

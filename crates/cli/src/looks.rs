@@ -26,7 +26,7 @@ pub struct Looks {
 }
 
 impl Looks {
-    /// What the command line asks for, of a rendering of a scene to `output`.
+    /// Choices of the command line for a rendering of a scene to `output`.
     pub fn begin(args: &RenderArgs, scene: &Scene, output: &Path) -> Result<Self, Failure> {
         let file = preview(output).filter(|_| args.preview);
         if file.is_none() && args.display_server.is_none() {

@@ -43,7 +43,7 @@ enum Identity {
 }
 
 impl Files {
-    /// Notes an input. Names that lead to no file, such as those of built-in scenes, are ignored.
+    /// Notes an input. Names that lead to no file, such as the names of built-in scenes, are ignored.
     ///
     /// # Errors
     /// An output is the same file.
@@ -91,7 +91,7 @@ impl Files {
         Ok(())
     }
 
-    /// Notes that files may be written in a directory, under names that `ours` tells.
+    /// Notes that files may be written in a directory, under names that `ours` accepts.
     ///
     /// # Errors
     /// An input lies there under such a name.
@@ -243,7 +243,7 @@ pub fn check_own(path: &Path) -> Result<(), Failure> {
     )))
 }
 
-/// Checks that so many bytes have room beside `path`, as far as the system tells.
+/// Checks that so many bytes have room beside `path`, as far as the system reports it.
 pub fn check_room(path: &Path, bytes: u64) -> Result<(), Failure> {
     match fs4::available_space(directory(path)) {
         Ok(free) if free < bytes && !is_stream(path) => Err(Failure::Work(format!(

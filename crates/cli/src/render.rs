@@ -196,7 +196,7 @@ fn options(args: &RenderArgs, recipe: Recipe, until: Option<Until>) -> Options {
 /// Work of an earlier run.
 #[derive(Default)]
 struct Earlier {
-    /// Whether the part that is asked for is there.
+    /// Whether the requested part is there.
     is_complete: bool,
     /// Samples to go on from, if there are any.
     samples: Option<Snapshot>,
@@ -363,7 +363,7 @@ fn lesson(args: &RenderArgs, scene: &Scene, order: Order) -> Result<Option<Lesso
     }
 }
 
-/// Bytes that the output may take: those of an image as it is without compression, or of the sums of a shard,
+/// Bytes that the output may take: the size of an uncompressed image, or of the sums of a shard,
 /// whose tiles overlap a little.
 fn room(scene: &Scene, args: &RenderArgs) -> u64 {
     let [x0, x1, y0, y1] = scene.film.pixel_bounds().map(u64::from);
@@ -454,7 +454,7 @@ fn named_files(args: &RenderArgs) -> Vec<(&'static str, &Path)> {
         .collect()
 }
 
-/// Whether more than a part is asked for.
+/// Whether more than a part is requested.
 fn has_further_outputs(args: &RenderArgs) -> bool {
     args.json.is_some() || args.stderr_image.is_some() || args.save_order.is_some()
 }
@@ -464,7 +464,7 @@ fn is_writable_format(path: &Path) -> bool {
     antumbra_image::writable_extensions().any(|known| extension.eq_ignore_ascii_case(known))
 }
 
-/// The name that the scene gives its film, or the scene's own, in the current directory; that of a shard says
+/// The name that the scene gives its film, or the scene's own, in the current directory; the name of a shard says
 /// which one it is.
 fn default_output(scene: &Scene, shard: Option<Shard>) -> PathBuf {
     let image = default_image(scene);

@@ -255,7 +255,7 @@ pub fn apply_pose(loaded: &mut Loaded, args: &PoseArgs) -> Result<(), Failure> {
     pose(loaded, args, Stage::default())
 }
 
-/// Moves the camera. Meshes get the stage, turned and framed as asked.
+/// Moves the camera. Meshes get the stage, turned and framed as the command line says.
 fn pose(loaded: &mut Loaded, args: &PoseArgs, stage: Stage) -> Result<(), Failure> {
     let scene = &mut loaded.scene;
     match loaded.stage {

@@ -64,7 +64,7 @@ pub fn run(args: &StudyArgs, memory: MemorySize) -> Result<(), Failure> {
     execute(&plan, args.json.as_ref())
 }
 
-/// The study that the command line asks for.
+/// The study that the command line describes.
 fn plan(args: &StudyArgs, isa: Isa, memory: MemorySize, scenes: Vec<Subject>) -> Plan {
     let defaults = Plan::default();
     let recipe = args.preset.preset.recipe();

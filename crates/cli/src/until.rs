@@ -75,8 +75,8 @@ pub struct Grown {
     pub interrupted: bool,
 }
 
-/// Renders in steps until a limit is reached, of an earlier run's samples if there are any. Sets the samples per pixel of
-/// `options` to those of the picture.
+/// Renders in steps until a limit is reached. Continues from the samples of an earlier run, if there are any. Sets the
+/// samples per pixel of `options` to the number in the picture.
 ///
 /// An interruption ends with the last finished step of this run, if there is one.
 pub fn render(

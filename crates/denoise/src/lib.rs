@@ -1,7 +1,7 @@
 //! Intel Open Image Denoise 2, loaded at run time. All `unsafe` of denoising is here.
 //!
 //! Nothing of the library is needed to build or to run the program. The functions used are looked up in the shared library
-//! by name. Their signatures are those of the header `OpenImageDenoise/oidn.h` of versions 2.0 to 2.5. The library is
+//! by name. Their signatures follow the header `OpenImageDenoise/oidn.h` of versions 2.0 to 2.5. The library is
 //! never unloaded: threads of its task scheduler may still be running in it.
 
 use std::env;
@@ -361,7 +361,7 @@ mod tests {
         }
     }
 
-    /// With the library at hand, named by `OIDN_LIBRARY`: noise around a grey goes, an edge stays.
+    /// With the library named by `OIDN_LIBRARY`: noise around a grey goes, an edge stays.
     #[test]
     fn noise_goes_and_edges_stay() {
         if env::var_os("OIDN_LIBRARY").is_none() {

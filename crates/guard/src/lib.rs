@@ -14,8 +14,8 @@
 //!
 //! # What is counted
 //!
-//! Bytes that the program asks for are counted, which costs an addition. The count decides only when to ask the system
-//! for the resident size, because memory that was asked for and never touched takes no room.
+//! Bytes that the program allocates are counted, which costs an addition. The count decides only when to query the system
+//! for the resident size, because memory that was allocated and never touched takes no room.
 
 mod signals;
 
@@ -24,14 +24,14 @@ use std::alloc::{GlobalAlloc, Layout, System};
 
 /// Bytes beyond the limit that a process may have: its code, its stacks, and what the system's allocator keeps.
 const SLACK: usize = 48 << 20;
-/// Growth after which the resident size is asked for again, beyond the limit.
+/// Growth beyond the limit after which the resident size is queried again.
 const STEP: usize = 4 << 20;
 /// Exit code at the limit: `EX_DATAERR`, as for inputs that are refused beforehand.
 const TOO_LARGE: i32 = 65;
 /// Exit code when the system has no memory.
 const NO_MEMORY: i32 = 1;
 
-/// Bytes that the program has asked for and not given back.
+/// Bytes that the program has allocated and not freed.
 static ASKED: AtomicUsize = AtomicUsize::new(0);
 /// Bytes that are allowed.
 static LIMIT: AtomicUsize = AtomicUsize::new(usize::MAX);
@@ -102,7 +102,7 @@ fn grow(bytes: usize) {
     }
 }
 
-/// Exits if the process takes too much memory, of which it has asked for more than is allowed.
+/// Exits if the process takes more resident memory than is allowed. Called when it has allocated more than that.
 #[cold]
 fn check(before: usize, bytes: usize) {
     if before / STEP == before.saturating_add(bytes) / STEP {
@@ -209,7 +209,7 @@ impl Line {
     }
 }
 
-/// Resident memory of the process in bytes, if the system tells.
+/// Resident memory of the process in bytes, if the system reports it.
 #[cfg(target_os = "linux")]
 fn resident() -> Option<usize> {
     let mut text = [0_u8; 128];

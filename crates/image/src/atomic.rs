@@ -114,7 +114,7 @@ impl Target {
     /// Follows an output name. A link that leads nowhere ends at the free name in it.
     ///
     /// # Errors
-    /// The name is that of a directory or no file name, or the system fails.
+    /// The name belongs to a directory or is no file name, or the system fails.
     pub fn of(path: &Path) -> io::Result<Self> {
         let mut place = path.to_path_buf();
         for _ in 0..MOST_LINKS {
@@ -237,7 +237,7 @@ fn replace(target: &Path, write: impl FnOnce(&mut dyn Output) -> io::Result<()>)
     sync_directory(directory)
 }
 
-/// Tells whether files can be made in a directory, by making one and removing it. Permissions alone would not tell:
+/// Whether files can be made in a directory, tried by making one and removing it. Permissions are not enough to know:
 /// there are read-only file systems and access lists.
 ///
 /// # Errors

@@ -40,7 +40,7 @@ impl FromStr for Tonemap {
     }
 }
 
-/// How linear values become those of a display.
+/// Maps linear values to display values.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Display {
     /// Exposure in stops: 1 is twice as bright.

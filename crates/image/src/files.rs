@@ -147,7 +147,7 @@ impl Rgb8Image {
 impl Raster {
     /// Reads an image file. The extension of its name chooses the format, in upper or lower case.
     ///
-    /// Formats are those of [`raster_extensions`](crate::raster_extensions). Images have at most 2^27 pixels.
+    /// Formats are listed by [`raster_extensions`](crate::raster_extensions). Images have at most 2^27 pixels.
     ///
     /// # Errors
     /// [`Error::UnknownFormat`], [`Error::Read`] (also if `path` is not a regular file) or [`Error::Decode`].

@@ -52,7 +52,7 @@ const TEXT: [u8; 3] = [255; 3];
 
 /// Draws `field`, `[height, width]` values with the top row first.
 ///
-/// The legend below the picture shows the colour map over the full width. Under it stand the values at both ends and,
+/// The legend below the picture shows the colour map over the full width. Under it are the values at both ends and,
 /// if there is room, in the middle. A picture that is too narrow for two numbers is widened with black on the right.
 /// NaN is grey. Infinities get the colour of their end, as other values beyond the ends do.
 ///

@@ -1,4 +1,4 @@
-//! The mark of this program in the pictures that it writes, by which its own files are told from others.
+//! The mark of this program in the pictures that it writes, by which its own files are recognised.
 //!
 //! An EXR file has the attribute `software`, a PNG file the text `Software`, and a Radiance HDR file the variable
 //! `SOFTWARE`. None changes a pixel.
@@ -7,13 +7,13 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Name of the program as it stands in pictures. Without a version, so that equal pictures are equal files.
+/// Name of the program as it is written in pictures. Without a version, so that equal pictures are equal files.
 pub(crate) const SOFTWARE: &str = "antumbra";
 
 /// Bytes at the beginning of a picture that may hold the mark.
 const SEARCHED: u64 = 4096;
 
-/// Tells whether a file is a picture that this program wrote: an EXR, PNG or HDR file with its mark.
+/// Whether a file is a picture that this program wrote: an EXR, PNG or HDR file with its mark.
 ///
 /// # Errors
 /// The file cannot be read.

@@ -4,7 +4,7 @@ use antumbra::{Bvh, Ray};
 
 use crate::thread_time;
 
-/// Speedup of a tree over another one, measured in turns on one thread.
+/// Speedup of a tree over another one, measured interleaved on one thread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gain {
     /// Median of the speedups of all turns.
@@ -17,7 +17,7 @@ pub struct Gain {
     pub rays: usize,
 }
 
-/// Speedup of `tree` over `baseline` on occlusion rays, as ray streams. Every turn asks both trees all rays, and every
+/// Speedup of `tree` over `baseline` on occlusion rays, as ray streams. Every turn traces all rays in both trees, and every
 /// other turn begins with the other tree. `None` without rays or turns, or if an answer differs.
 pub fn gain(baseline: &Bvh, tree: &Bvh, rays: &[Ray], turns: usize) -> Option<Gain> {
     if rays.is_empty() || turns == 0 {

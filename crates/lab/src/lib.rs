@@ -1,4 +1,4 @@
-//! The laboratory: what a tree costs, measured on the rays that pictures really ask.
+//! The laboratory: what a tree costs, measured on the rays of pictures.
 //!
 //! [`study`] answers the same rays by many orders, builders, collapses and widths, counts their node
 //! tests and writes a report. [`mod@bench`] measures rays per second, side by side with Embree.
@@ -23,8 +23,8 @@
 //! # }
 //! ```
 //!
-//! Nothing here prints: a [`Watcher`] hears how far the work is, and can stop it. What an experiment found is
-//! returned, and written to a directory when asked.
+//! Nothing here prints: a [`Watcher`] receives how far the work is, and can stop it. What an experiment found is
+//! returned, and written to a directory on request.
 //!
 //! - `study/`: the plan, its renderings and replays, and what each cost;  `report/`: a study as tables and a page
 //! - `bench/`: engines that take turns on one list of rays;  `bench/embree/`: the binding of the C library

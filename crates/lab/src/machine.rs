@@ -20,7 +20,7 @@ pub struct Caller {
 pub struct Machine {
     /// Version of Antumbra.
     pub version: &'static str,
-    /// Name of the CPU, if the system tells.
+    /// Name of the CPU, if the system reports it.
     pub cpu: Option<String>,
     /// Instruction set of the queries, the first if there are several.
     pub level: String,
@@ -53,7 +53,7 @@ impl Machine {
     }
 }
 
-/// The CPU's name where Linux tells it.
+/// The CPU's name, where Linux reports it.
 fn cpu_name() -> Option<String> {
     let text = std::fs::read_to_string("/proc/cpuinfo").ok()?;
     let line = text.lines().find(|line| line.starts_with("model name"))?;

@@ -8,7 +8,7 @@ pub fn seconds() -> f64 {
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }
 
-/// Seconds since the first call, where nobody tells for how long a thread has run.
+/// Seconds since the first call, on systems that do not report the time of a thread.
 #[cfg(not(unix))]
 pub fn seconds() -> f64 {
     use std::sync::LazyLock;

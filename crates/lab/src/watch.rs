@@ -9,7 +9,7 @@ use crate::{Error, Table};
 /// A piece of a study's work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Step {
-    /// A tree that is compared with others on a picture. Those of one picture are finished together.
+    /// A tree that is compared with others on a picture. The trees of one picture are finished together.
     Comparison,
     /// A whole picture, for its time.
     Rendering,

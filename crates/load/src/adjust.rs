@@ -97,7 +97,7 @@ pub fn set_ambient(
     }
 }
 
-/// Sets how many shadow rays a point asks for: per camera ray of ambient occlusion, per light of direct lighting.
+/// Sets the number of shadow rays of a point: per camera ray of ambient occlusion, per light of direct lighting.
 ///
 /// # Errors
 /// [`Error::NoSampleCount`] for path tracing.

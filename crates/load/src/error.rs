@@ -12,7 +12,7 @@ use crate::{Crop, MemorySize};
 const KNOWN: &str =
     ".pbrt, .ply, .obj, .stl, .gltf, .glb, height rasters as .tif, .asc or .npy, or builtin:NAME";
 
-/// Why a scene was not loaded or cannot be used as asked.
+/// Why a scene was not loaded or cannot be used as requested.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -99,9 +99,9 @@ pub enum Error {
     EmptyCrop {
         /// Name of the scene.
         scene: String,
-        /// Width asked for.
+        /// Requested width in pixels.
         width: u32,
-        /// Height asked for.
+        /// Requested height in pixels.
         height: u32,
         /// The crop window, as `[x_min, x_max, y_min, y_max]` in fractions.
         crop: [f32; 4],

@@ -1,6 +1,6 @@
 //! Estimates of the memory that a scene and its picture take.
 //!
-//! A file of a few lines can ask for more memory than any machine has. Running out of it would end the program
+//! A file of a few lines can need more memory than any machine has. Running out of it would end the program
 //! without a word.
 
 use antumbra_scene::{Geometry, Instance, Scene};

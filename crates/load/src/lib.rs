@@ -19,8 +19,8 @@
 //!
 //! - `file`: from a name to a scene, by its extension
 //! - `terrain`: height rasters as meshes
-//! - `stage`: camera, sun, sky and ground for meshes that come alone;  `clear_sky`: that sky
-//! - `extent`, `up`: where a scene lies, and which way it stands
+//! - `stage`: camera, sun, sky and ground for meshes without them;  `clear_sky`: that sky
+//! - `extent`, `up`: where a scene is, and which axis is up
 //! - `adjust`, `crop`: what a caller may choose instead of the scene: camera, film, integrator, samples
 //! - `memory`: sizes of memory;  `estimate`: memory that a scene and its picture take
 //! - `error`: why there is no scene

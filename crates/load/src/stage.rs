@@ -1,6 +1,6 @@
 //! Stages for meshes that come without a camera or lights: framed to fill the picture, under sun and sky.
 //!
-//! Directions are those of a stage that looks along -z with y up. [`Up`] turns the stage as the mesh stands.
+//! Directions belong to a stage that looks along -z with y up. [`Up`] turns the stage to the up axis of the mesh.
 
 use std::str::FromStr;
 use std::sync::Arc;
@@ -147,7 +147,7 @@ impl std::fmt::Display for Up {
     }
 }
 
-/// Choices for the stage. `None` and the default are those of the program.
+/// Choices for the stage. `None` and the default are the program's choices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stage {
     /// Axis that points up.
@@ -225,7 +225,7 @@ pub fn scene_of_model(name: String, model: Model) -> (Scene, OwnStage) {
 }
 
 /// Sets up the stage of a scene made from a model: the camera unless the file has its own, and sun and sky unless the file
-/// has its own lights and nothing is asked for.
+/// has its own lights and nothing is requested.
 pub fn set_stage(scene: &mut Scene, own: OwnStage, stage: &Stage) {
     let world_from_stage = stage.up.matrix();
     if !own.camera {
@@ -566,7 +566,7 @@ mod tests {
         }
     }
 
-    /// The sun of the default stage stands where it always stood, and a sun at azimuth 90 stands to the right.
+    /// The sun of the default stage has not moved, and a sun at azimuth 90 is on the right.
     #[test]
     fn suns_and_skies_follow_the_stage() {
         let of = |up, sun: Sun| {

@@ -1,6 +1,6 @@
 //! Which way is up: what files say, and what speaks for it where they say nothing.
 //!
-//! Every command takes the axis from here, so that a mesh stands the same way in all of them.
+//! Every command takes the axis from here, so that a mesh has the same up axis in all of them.
 
 use std::path::Path;
 
@@ -21,7 +21,7 @@ pub struct Upright {
 
 /// A ground has at least this part of the area of the box as seen from above.
 const GROUND: f64 = 0.5;
-/// Scenes that stand on a ground are at most so high for their shorter side.
+/// Largest ratio of height to shorter side of a scene that is taken to be on a ground.
 const HIGHEST: f64 = 0.7;
 /// The shortest side is this much shorter than the others where it speaks for an axis.
 const FLAT: f64 = 0.5;

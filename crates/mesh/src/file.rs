@@ -7,7 +7,7 @@ use std::path::Path;
 /// Bytes that a file is recognised by.
 const START: u64 = 4096;
 
-/// Reads a regular file of at most `limit` bytes, whose first bytes are as they must be: `starts` tells what is wrong.
+/// Reads a regular file of at most `limit` bytes, whose first bytes are checked: `starts` returns what is wrong with them.
 ///
 /// Larger files are refused before anything is read, and so are devices and pipes, which may never end. A file that is
 /// something else may be huge, so only its start is read.

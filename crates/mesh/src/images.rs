@@ -188,7 +188,7 @@ impl Images {
     }
 }
 
-/// Name whose extension tells the format: by the first bytes of the file, or else by its name.
+/// Name whose extension gives the format: by the first bytes of the file, or else by its name.
 fn named_by_contents(bytes: &[u8], name: &str) -> PathBuf {
     let path = Path::new(name);
     let format = match bytes {

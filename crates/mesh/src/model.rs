@@ -12,7 +12,7 @@ use crate::Names;
 pub struct Model {
     /// Shapes in world space.
     pub shapes: Vec<Shape>,
-    /// Meshes that stand in the world more than once.
+    /// Meshes with several instances in the world.
     pub objects: Vec<Object>,
     /// Placements of the objects.
     pub instances: Vec<Instance>,
@@ -64,7 +64,7 @@ impl Model {
 pub struct Warning {
     /// File, with line and column where the format has them.
     pub place: String,
-    /// What is missing, and what stands in for it.
+    /// What is missing, and what replaces it.
     pub text: String,
 }
 

@@ -1,6 +1,6 @@
 //! STL, ASCII and binary: triangles without looks.
 //!
-//! Vertices at the same place become one. Facet normals are those of the corners, whatever the file says. Attribute bytes,
+//! Vertices at the same place become one. Facet normals follow from the corners, whatever the file says. Attribute bytes,
 //! in which some programs keep colours in ways of their own, are not read.
 
 use std::collections::HashMap;

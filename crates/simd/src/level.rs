@@ -19,7 +19,7 @@ named_list! {
     }
 }
 
-/// Whether the CPU has all these features of x86-64. Only the standard library asks the CPU; without it, whether the program
+/// Whether the CPU has all these features of x86-64. Only the standard library queries the CPU; without it, whether the program
 /// was compiled for them.
 #[cfg(target_arch = "x86_64")]
 macro_rules! has {
@@ -115,7 +115,7 @@ pub trait Simd: Copy + Send + Sync + 'static + Width<4> + Width<8> + Width<16> {
     /// Level that the token stands for.
     const LEVEL: Level;
 
-    /// Keeps those of the first `count` words whose upper half is at most `limit`, and returns their number.
+    /// Keeps, of the first `count` words, the words whose upper half is at most `limit`, and returns their number.
     ///
     /// Kept words are written to the front of `out` in their order. The rest of `out` is unspecified.
     /// Callers guarantee that `count` is at most 8 and that upper halves and `limit` are below 2³¹.

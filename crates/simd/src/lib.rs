@@ -14,8 +14,8 @@
 //! - [`scratch`]: arrays on the program stack that nobody clears
 //! - `arch`: one file per instruction set, besides `scalar` (the reference) and `pair` (vectors wider than the CPU's)
 //!
-//! Without the feature `std` (on by default) the crate needs `alloc` alone. It then takes the levels for available that the
-//! program is compiled for, because only the standard library asks the CPU.
+//! Without the feature `std` (on by default) the crate needs only `alloc`. It then takes the levels for available that the
+//! program is compiled for, because only the standard library queries the CPU.
 //!
 //! Every level returns the bits of the scalar level for every operation except [`Lanes::mul_sub`].
 //!

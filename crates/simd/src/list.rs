@@ -7,7 +7,7 @@
 use alloc::string::String;
 use core::fmt;
 
-/// A name that stands in no row of a list.
+/// A name that is in no row of a list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownName {
     /// What was to be named: `order`, `builder` ...
@@ -68,7 +68,7 @@ macro_rules! named_list {
                 }
             }
 
-            /// One sentence that tells what it is, without a full stop.
+            /// One sentence that describes the entry, without a full stop.
             pub const fn sentence(self) -> &'static str {
                 match self {
                     $($(#[cfg(feature = $feature)])? Self::$variant => $sentence,)*

@@ -67,7 +67,7 @@ impl<T> Slots<'_, T> {
     }
 }
 
-/// Asks for huge pages. Call before the memory is first touched, because pages are assigned then.
+/// Requests huge pages. Call before the memory is first touched, because pages are assigned then.
 #[cfg(all(feature = "std", target_os = "linux"))]
 fn prefer_huge_pages<T>(memory: &mut [MaybeUninit<T>]) {
     /// Bytes below which memory hardly holds one huge page.
@@ -89,7 +89,7 @@ fn prefer_huge_pages<T>(memory: &mut [MaybeUninit<T>]) {
     }
 }
 
-/// Does nothing: other systems choose page sizes themselves, and without the standard library there is nobody to ask.
+/// Does nothing: other systems choose page sizes themselves, and without the standard library there is no way to request them.
 #[cfg(not(all(feature = "std", target_os = "linux")))]
 fn prefer_huge_pages<T>(_memory: &mut [MaybeUninit<T>]) {}
 

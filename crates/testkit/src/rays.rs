@@ -38,7 +38,7 @@ fn extent(mesh: &Mesh) -> f32 {
 
 /// Rays for a mesh in bundles of up to 40 similar rays.
 ///
-/// Rays of a bundle leave one point, meet in one point, or run side by side, with a narrow or wide spread. Some bundles
+/// Rays of a bundle leave one point, end in one point, or run side by side, with a narrow or wide spread. Some bundles
 /// contain unrelated or invalid rays.
 pub fn bundles(rng: &mut Rng, mesh: &Mesh, count: usize) -> Vec<TestRay> {
     let extent = extent(mesh);

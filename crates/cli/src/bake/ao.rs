@@ -60,7 +60,7 @@ struct Document<'a> {
     bake_seconds: f64,
 }
 
-/// Points whose values are asked for.
+/// Points whose values are computed.
 enum Target {
     /// Vertices of the mesh, moved a little into their surfaces.
     Vertices(Vec<[f32; 3]>),
@@ -204,7 +204,7 @@ fn atlas(ground: &Ground, size: u32) -> Result<Atlas, Failure> {
     Ok(atlas)
 }
 
-/// The job that the command line asks for.
+/// The job that the command line describes.
 fn job(args: &AoArgs, ground: &Ground, target: &Target) -> Result<OcclusionJob, Failure> {
     let (points, normals) = match target {
         Target::Vertices(points) => (points, &ground.mesh.normals),

@@ -50,7 +50,7 @@ pub fn is_part(path: &Path) -> bool {
     archive::starts_with(path, Part::MAGIC)
 }
 
-/// Checks the names of outputs against the share asked for, and notes them and the file of chunks.
+/// Checks the names of outputs against the share to compute, and notes them and the file of chunks.
 pub fn declare(
     outputs: &[PathBuf],
     shard: Option<Shard>,
@@ -99,8 +99,8 @@ pub fn join<J: Job>(work: &mut Work<'_, J>, parts: &[PartFile]) -> Result<(), Fa
     Ok(())
 }
 
-/// Computes all chunks that are not there yet, and keeps them on the way: those of a share in `output`, others beside it in a
-/// checkpoint, which is returned. As for renderings, a checkpoint that cannot be written is told once, and the work goes on.
+/// Computes all missing chunks, and saves them meanwhile: the chunks of a share in `output`, all others beside it in a
+/// checkpoint, which is returned. A checkpoint that cannot be written is reported once, and the work goes on.
 ///
 /// # Errors
 /// [`Failure::Continuable`] if the work was interrupted and chunks are kept.

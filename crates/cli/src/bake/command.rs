@@ -53,7 +53,7 @@ pub struct Done<T> {
 pub type Named<'a> = (&'a str, Option<&'a Path>);
 
 impl Bake<'_> {
-    /// Notes all files, those of these flags too, and checks that outputs can be written.
+    /// Notes all files, with the files of these flags, and checks that outputs can be written.
     pub fn declare(&self, written: &[Named<'_>], read: &[Named<'_>]) -> Result<Files, Failure> {
         let is_shared = self.chunks.shard.is_some() || self.parts.is_some();
         if is_shared && self.scene == Path::new(scenes::STDIN) {
@@ -88,7 +88,7 @@ impl Bake<'_> {
         Ground::load(self.scene, isa, memory, files, self.earth)
     }
 
-    /// Computes a job with a tree of the scene, or the share of it that is asked for; or joins the parts.
+    /// Computes a job, or one share of it, with a tree of the scene. With parts, joins them instead.
     pub fn compute<J: Job>(
         &self,
         job: &J,
@@ -167,7 +167,7 @@ impl Bake<'_> {
         self.chunks.shard.map(|shard| shard.to_string())
     }
 
-    /// Says what was done and written: `number` things in so many seconds, or those of the merged parts.
+    /// Prints what was done and written: `number` things in so many seconds, or the things of the merged parts.
     pub fn tell_done(&self, things: &str, number: u64, seconds: f64) {
         let things = format!("{} {things}", count(number));
         let wrote = self.output_names().join(", ");

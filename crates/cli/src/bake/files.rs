@@ -57,7 +57,7 @@ pub fn npz(path: &Path, entries: &[Entry<'_>]) -> Result<(), Failure> {
     Ok(atomic_write(path, |file| write_npz(entries, file))?)
 }
 
-/// Writes a mesh as .ply; `name` is that of the value.
+/// Writes a mesh as .ply; `name` is the name of the value.
 pub fn ply(path: &Path, name: &str, mesh: &ShadedMesh<'_>) -> Result<(), Failure> {
     output::check_room(path, mesh.bytes())?;
     Ok(atomic_write(path, |file| mesh.write(name, file))?)

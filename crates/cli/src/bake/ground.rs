@@ -100,7 +100,7 @@ impl Ground {
         }
     }
 
-    /// The up axis: the one asked for, or the one of the scene. Says what was read.
+    /// The up axis: of the command line, or else of the scene. Prints what was read.
     ///
     /// # Errors
     /// It is neither y nor z.
@@ -123,7 +123,7 @@ impl Ground {
         }
     }
 
-    /// Says what was read. `counts` are further counts, before that of the triangles.
+    /// Prints what was read. `counts` are further counts, printed before the number of triangles.
     pub fn tell(&self, counts: &str) {
         tell(format_args!(
             "{}: {counts}{} triangles, loaded in {:.2} s, tree built in {:.2} s",

@@ -8,7 +8,7 @@ use super::{ao, factors, horizon, sun, visible};
 use crate::args::{Cli, Command, MergeArgs};
 use crate::exit::Failure;
 
-/// Joins parts, and writes what the command would have written without `--shard`. Outputs are those of the command line alone:
+/// Joins parts, and writes what the command would have written without `--shard`. Outputs are named by the command line only:
 /// a part may come from somebody else.
 pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
     if args.stderr_image.is_some() {

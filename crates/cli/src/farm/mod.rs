@@ -1,7 +1,7 @@
 //! `antumbra farm`: a picture or a bake made by the machines of a scheduler that exists already.
 //!
 //! Every task computes one shard, and a last one merges them. The scheduler does the rest: it opens
-//! connections, moves files, starts tasks again; this program writes what it is to be told.
+//! connections, moves files, starts tasks again; this program writes its instructions.
 //!
 //! - `slurm`: an array job and a dependent one, submitted
 //! - `openjd`: a template of the Open Job Description, for AWS Deadline Cloud and others
@@ -29,7 +29,7 @@ pub fn run(command: &FarmCommand) -> Result<(), Failure> {
     }
 }
 
-/// A job for any scheduler. All paths are absolute, and all is text that can stand in scripts.
+/// A job for any scheduler. All paths are absolute, and all is text that scripts can contain.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
 struct Plan {
     program: String,

@@ -114,7 +114,7 @@ fn cut(text: &str, columns: usize) -> String {
     format!("{start}…")
 }
 
-/// Breaks long lines between words. Lines that begin with a space are left alone: they show places in files.
+/// Breaks long lines between words. Lines that begin with a space are not broken: they show places in files.
 pub fn wrapped(text: &str) -> String {
     let lines = text.split('\n').map(|line| {
         if line.chars().count() <= COLUMNS || line.starts_with(' ') {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use antumbra_lab::{Step, Work};
 
-/// Share of the piece under way from which its whole time is told.
+/// Share of the current piece from which its whole time is estimated.
 const TELLING: f64 = 0.05;
 
 /// Pieces of work by kind, with what they weigh: about how long each takes beside the others.

@@ -150,7 +150,7 @@ pub fn hash_text(hash: u64) -> String {
     format!("{hash:016x}")
 }
 
-/// Tells people how it went.
+/// Prints counts, times and files of the rendering.
 pub fn summarise(document: &Document, split: &Split) {
     let Document {
         machine,

@@ -37,7 +37,7 @@ struct Built {
     times: Option<BuildTimes>,
 }
 
-/// Medians of what the steps of our builds took; `None` for Embree, which does not tell.
+/// Median seconds of the steps of our builds; `None` for Embree, which does not report them.
 fn step_seconds(built: &[Built]) -> Option<StepSeconds> {
     let times: Option<Vec<BuildTimes>> = built.iter().map(|built| built.times).collect();
     let times = times?;

@@ -4,7 +4,7 @@ use std::fmt;
 
 use antumbra::{Hit, Ray};
 
-/// Question asked of every ray.
+/// Query of every ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Query {
     /// Whether anything is in its interval.
@@ -36,7 +36,7 @@ impl fmt::Display for Query {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answers {
     Occluded(Vec<bool>),
-    /// Distances of closest hits, infinite for none. Which primitive was hit is not compared: where two meet,
+    /// Distances of closest hits, infinite for none. Which primitive was hit is not compared: where two touch,
     /// kernels may differ.
     Distances(Vec<f32>),
 }
@@ -83,7 +83,7 @@ impl Answers {
         }
     }
 
-    /// Share of the rays that met something; 0 for no rays.
+    /// Share of the rays that hit something; 0 for no rays.
     pub fn occluded_share(&self) -> f64 {
         let (hits, all) = match self {
             Self::Occluded(answers) => (answers.iter().filter(|hit| **hit).count(), answers.len()),

@@ -1,4 +1,4 @@
-//! Benchmarks: rays per second, ours and Embree's, on the rays that a scene's camera paths really ask.
+//! Benchmarks: rays per second, ours and Embree's, on the rays of a scene's camera paths.
 //!
 //! [`run`] measures what [`Options`] say and returns [`Results`].
 //!
@@ -132,7 +132,7 @@ pub struct Results {
 
 /// Measures how many rays per second are answered.
 ///
-/// The rays are those of camera paths of up to five bounces: camera rays, shadow rays to the lights, and diffuse
+/// The rays come from camera paths of up to five bounces: camera rays, shadow rays to the lights, and diffuse
 /// bounces. All engines take turns on one list of rays; ratios are medians over the rounds. All answers are compared
 /// with a watertight reference, which is compared with brute force.
 ///
@@ -416,7 +416,7 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// A tree for every width, collapse and order asked for.
+    /// A tree for every width, collapse and order requested.
     fn trees(&self, ingredients: &Ingredients, isa: Isa) -> Result<Vec<Tree>, Error> {
         let mut trees = Vec::new();
         for width in self.options.widths_on(isa) {

@@ -13,7 +13,7 @@ use super::sphere::triangulate;
 const BOUNCES: u32 = 5;
 
 /// Makes a scene the same for every kernel: its spheres become meshes, and its integrator a path tracer of five
-/// bounces, whatever the scene asks for.
+/// bounces, whatever the scene names.
 pub fn prepare(scene: &mut Scene) {
     scene.integrator = Integrator::Path {
         max_depth: BOUNCES,
@@ -36,9 +36,9 @@ pub fn prepare(scene: &mut Scene) {
 /// Size of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Size {
-    /// Triangles, those of an object once for every instance.
+    /// Triangles; an object counts once for every instance.
     pub triangles: usize,
-    /// Triangles, those of an object once if there is an instance of it.
+    /// Triangles; an object with instances counts once.
     pub unique_triangles: usize,
     /// Unique triangles whose mesh has an alpha mask.
     pub cutouts: usize,

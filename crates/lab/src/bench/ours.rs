@@ -26,7 +26,7 @@ pub struct Ingredients {
 
 impl Ingredients {
     /// Builds the binary tree of a recipe and logs the sample in it: shadow and diffuse rays alike, because a log of one
-    /// kind alone can ruin the other.
+    /// kind only can ruin the other.
     pub fn new(primitives: &Primitives, sample: &Rays, recipe: &Recipe) -> Self {
         let recipe = recipe.clock(Some(clock));
         let training = [&sample.shadow[..], &sample.diffuse].concat();
@@ -69,14 +69,14 @@ impl Ingredients {
     }
 }
 
-/// How a tree is asked.
+/// How a tree is queried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Api {
     Single,
     Batch,
 }
 
-/// A tree and how it is asked.
+/// A tree and how it is queried.
 pub struct Ours<'t> {
     pub tree: &'t Tree,
     pub api: Api,

@@ -48,7 +48,7 @@ pub struct Row {
     pub ratio_to_embree: Option<f64>,
     /// Rays answered otherwise than by the watertight reference.
     pub disagreements: usize,
-    /// Share of the rays that meet something.
+    /// Share of the rays that hit something.
     pub occluded: f64,
     /// Mean node tests per ray, of our occlusion queries.
     pub node_tests: Option<f64>,
@@ -64,7 +64,7 @@ pub struct KindRow {
     /// Triangles, as which the scene came.
     pub triangles: usize,
     /// `triangles` as they came; `quads`; `user` geometry; conditions on hits (`closed`, `mask`, `except`, `filter`,
-    /// `visit`); `refit`, and rays that are `refitted` trees are asked; `points`.
+    /// `visit`); `refit`, and rays with which `refitted` trees are queried; `points`.
     pub kind: &'static str,
     /// `occluded` of shadow rays, `intersect` of diffuse rays, `update` of vertices, `closest` to points.
     pub query: &'static str,
@@ -82,7 +82,7 @@ pub struct KindRow {
     pub ratio_to_embree: Option<f64>,
     /// Median over the rounds of the speed relative to plain triangles of the same engine; `null` where nothing compares.
     pub ratio_to_triangles: Option<f64>,
-    /// Answers that are not those of the first engine of ours, which is compared with brute force.
+    /// Answers that differ from our first engine, which is compared with brute force.
     pub disagreements: usize,
 }
 
@@ -107,7 +107,7 @@ pub struct BuildRow {
     /// Number of threads.
     pub threads: usize,
     /// Median wall time. Ours: from slices of vertices and indices to a tree that can be queried. Embree:
-    /// `rtcCommitScene` alone, of all objects and of the scene, buffers being filled.
+    /// only `rtcCommitScene`, of all objects and of the scene, buffers being filled.
     pub seconds: f64,
     /// The fastest time.
     pub best_seconds: f64,
@@ -169,7 +169,7 @@ pub struct Document {
     pub repeat: usize,
     /// Training rays per scene.
     pub log_rays: usize,
-    /// Whether there is everything that was asked for; if not, the benchmark was interrupted.
+    /// Whether all requested rows are there; if not, the benchmark was interrupted.
     pub complete: bool,
     /// Comparisons of the reference with brute force.
     pub checks: Vec<Check>,
@@ -177,7 +177,7 @@ pub struct Document {
     pub builds: Vec<BuildRow>,
     /// Rays per second.
     pub rows: Vec<Row>,
-    /// Things beside plain triangles; empty unless asked for.
+    /// Things beside plain triangles; empty unless requested.
     pub kinds: Vec<KindRow>,
 }
 

@@ -23,7 +23,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// Asks a tree ray by ray.
+    /// Queries a tree ray by ray.
     pub fn new(bvh: &Bvh, rays: &[Ray]) -> Self {
         let occluded = rays.iter().map(|ray| bvh.occluded(ray)).collect();
         let hits: Vec<_> = rays.iter().map(|ray| bvh.intersect(ray)).collect();
@@ -43,7 +43,7 @@ impl Reference {
     }
 
     /// Compares some of the answers with brute force: how many, and how many of these are not the same bits.
-    /// `triangles` says how many there are, those of an object once for every instance: more than are tested,
+    /// `triangles` says how many there are, an object once for every instance: more than are tested,
     /// because instances whose box is missed are passed over.
     pub fn check(&self, rays: &[Ray], brute: &Brute, triangles: usize) -> [usize; 2] {
         let affordable = (BRUTE_TESTS / triangles.max(1)).max(LEAST_BRUTE_RAYS);

@@ -5,7 +5,7 @@ use antumbra::Ray;
 use super::embree::{Packet, RayHit, Scene, SingleRay};
 use super::engine::{Answers, Engine, Label, Query, Work};
 
-/// How Embree is asked.
+/// How Embree is queried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Variant {
     /// `rtcOccluded1` and `rtcIntersect1` with default flags: what ratios refer to.
@@ -16,7 +16,7 @@ pub enum Variant {
     Packets,
 }
 
-/// A scene and how it is asked.
+/// A scene and how it is queried.
 pub struct Rival<'s> {
     pub scene: &'s Scene<'s>,
     pub variant: Variant,

@@ -107,7 +107,7 @@ fn model(random: &mut Random) -> Lowered<'static> {
     }
 }
 
-/// Where a ray meets a triangle: (t, u, v), by Cramer's rule.
+/// Where a ray hits a triangle: (t, u, v), by Cramer's rule.
 fn meet(ray: &Ray, corners: [[f64; 3]; 3]) -> Option<[f64; 3]> {
     let minus = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|axis| a[axis] - b[axis]);
     let det = |[a, b, c]: [f64; 3], [d, e, f]: [f64; 3], [g, h, i]: [f64; 3]| {
@@ -164,7 +164,7 @@ fn first_hit(model: &Lowered, ray: &Ray, query: QueryKind) -> f32 {
     first as f32
 }
 
-/// Asks an engine about all rays; returns how many answers differ from those of the loop.
+/// Traces all rays in an engine; returns how many answers differ from the loop.
 fn wrong(engine: &dyn Engine, query: Query, rays: &[Ray], expected: &Answers) -> Option<usize> {
     let mut work = engine.work(query, rays)?;
     work.reset();

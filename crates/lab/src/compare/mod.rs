@@ -1,7 +1,7 @@
 //! One picture whose queries many trees answer, interleaved.
 //!
 //! Camera paths, shading and film are done once. Every batch of shadow rays is answered and counted by every tree, and
-//! a sample of the batches is timed tree by tree. All trees therefore meet the same rays at nearly the same moment.
+//! a sample of the batches is timed tree by tree. All trees therefore trace the same rays at nearly the same moment.
 //!
 //! - `trees.rs`: the trees, each learned as its own rendering would
 //! - `comparison.rs`: the trees while the picture is traced
@@ -31,7 +31,7 @@ pub struct Compared {
     pub image_hash: u64,
     /// Closest-hit rays.
     pub closest_rays: u64,
-    /// Shadow rays, those of the pre-pass included.
+    /// Shadow rays, including the pre-pass.
     pub shadow_rays: u64,
     /// Shadow rays that are occluded.
     pub occluded_rays: u64,
@@ -68,11 +68,11 @@ pub struct ComparedTree {
     /// Seconds of a whole picture with this tree, composed, round by round. Work of all threads is divided by their
     /// number.
     pub render_seconds: Vec<f64>,
-    /// Seconds of every kind of work, summed over threads. Shadow queries are those of the median round.
+    /// Seconds of every kind of work, summed over threads. Shadow queries are from the median round.
     pub split: Split,
-    /// Whether all answers were those of the first tree, bit for bit.
+    /// Whether all answers equal the answers of the first tree, bit for bit.
     pub agrees: bool,
-    /// Mean tests per shadow ray of every pixel, if asked for.
+    /// Mean tests per shadow ray of every pixel, if requested.
     pub cost_map: Option<Vec<f32>>,
 }
 
@@ -162,8 +162,8 @@ pub fn compare(
     })
 }
 
-/// Seconds of timed closest hits, tree by tree. They do not depend on the order of children, so trees that differ by that
-/// alone share the median.
+/// Seconds of timed closest hits, tree by tree. They do not depend on the order of children, so trees that differ only in
+/// it share the median.
 fn closest_times(trees: &[Ready], found: &Found) -> Vec<f64> {
     let median_of = |first: usize| {
         let alike = trees

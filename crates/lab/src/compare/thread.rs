@@ -23,7 +23,7 @@ pub struct TreeSums {
     pub shadow: Vec<f64>,
     /// Seconds in timed closest-hit queries.
     pub closest: f64,
-    /// Whether an answer was not that of the tree that the paths were traced in.
+    /// Whether an answer differed from the tree in which the paths were traced.
     pub differs: bool,
 }
 
@@ -50,7 +50,7 @@ pub struct SharedSums {
     pub film: f64,
 }
 
-/// Queries with their answers, as they were asked.
+/// Queries with their answers, in the order of the calls.
 #[derive(Debug)]
 struct Kept<A> {
     rays: Vec<Ray>,

@@ -3,10 +3,10 @@
 //! A study compares trees and orders that are there. A probe tries what goes beyond a static order, one file each:
 //!
 //! - `ways`: per node, the static order, near first or far first
-//! - `splits`: spatial splits for occlusion alone
+//! - `splits`: spatial splits for occlusion only
 //! - `model`: cost models for events that are not independent
 //! - `moving`: a tree that learns while the camera moves
-//! - `rays`: training rays and held-out rays;  `turns`: timing in turns on one thread;  `row`: figures
+//! - `rays`: training rays and held-out rays;  `turns`: interleaved timing on one thread;  `row`: figures
 //!
 //! Everything is compared on the trees of the paper (`binned-sah`, collapsed by area) and on the default trees.
 
@@ -72,7 +72,7 @@ pub struct Options {
     pub log_rays: usize,
     /// Held-out rays of each kind.
     pub rays: usize,
-    /// Rounds in which everything is timed once; 0 for counts alone.
+    /// Rounds in which everything is timed once; 0 for counts only.
     pub rounds: usize,
     /// Frames of the moving camera.
     pub frames: usize,
@@ -80,7 +80,7 @@ pub struct Options {
     pub seed: u64,
 }
 
-/// The trees that everything is tried on: those of the paper and the default.
+/// The trees that everything is tried on: the paper's and the default.
 const TREES: [(Builder, Collapse); 2] = [
     (Builder::BinnedSah, Collapse::Area),
     (Builder::Reinsertion, Collapse::Learned),

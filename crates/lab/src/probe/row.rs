@@ -36,7 +36,7 @@ pub struct Row {
     pub log_rays: usize,
     /// Number of held-out rays.
     pub test_rays: usize,
-    /// Share of the held-out rays that meet something.
+    /// Share of the held-out rays that hit something.
     pub occluded_share: f64,
     /// Node tests.
     pub node_tests: f64,

@@ -1,4 +1,4 @@
-//! Spatial splits for occlusion alone: trees whose primitives may lie in several leaves, beside those of other builders.
+//! Spatial splits for occlusion only: trees whose primitives may be in several leaves, beside trees of other builders.
 //! Collapses are learned, and all trees are in the order `joint`.
 
 use antumbra::Bvh;

@@ -1,4 +1,4 @@
-//! Timing in turns on one thread.
+//! Interleaved timing on one thread.
 
 use antumbra::{Bvh, Ray};
 
@@ -71,7 +71,7 @@ pub fn time_both<T>(
     }
 }
 
-/// Asks a tree, as one batch or ray by ray, on this thread.
+/// Queries a tree, as one batch or ray by ray, on this thread.
 pub fn ask(bvh: &Bvh, rays: &[Ray], batch: bool, answers: &mut [bool]) {
     if batch {
         bvh.batch(rays).on_this_thread().occluded_into(answers);

@@ -1,6 +1,6 @@
 //! Occlusion rays of a rendering in lots that share no sample: training rays and held-out rays.
 //!
-//! All samples of the picture stand in one fixed sequence that jumps evenly over it. A lot has the rays of the next
+//! All samples of the picture are in one fixed sequence that jumps evenly over it. A lot has the rays of the next
 //! samples of the sequence. Two lots therefore have different samples, a lot of any size covers the whole picture,
 //! and a smaller first lot is the beginning of a larger one.
 

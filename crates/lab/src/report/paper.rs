@@ -44,18 +44,18 @@ pub struct Figures {
     pub total_render_s: f64,
 }
 
-/// A scene of the paper that stands beside one of ours.
+/// A scene of the paper that is compared with one of ours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counterpart {
     /// Name in the paper.
     pub name: &'static str,
-    /// Whether it is the same scene; otherwise ours stands in for one that is not public.
+    /// Whether it is the same scene; otherwise ours replaces one that is not public.
     pub same: bool,
     /// Share of shadow rays among all rays.
     pub shadow_share: f64,
 }
 
-/// The scene of the paper that ours is, or stands in for.
+/// The scene of the paper that ours is or replaces.
 pub fn counterpart(scene: &str) -> Option<Counterpart> {
     let found = SCENES.iter().find(|(ours, ..)| *ours == scene);
     let &(_, name, same) = found?;
@@ -76,7 +76,7 @@ pub fn tables() -> Result<Vec<Figures>, Error> {
     lines.map_err(Error::report)
 }
 
-/// Lines of the paper about the scene that ours is or stands in for, in the order of its tables.
+/// Lines of the paper about the scene that ours is or replaces, in the order of its tables.
 pub fn lines(scene: &str, width: usize) -> Vec<Figures> {
     let Some(theirs) = counterpart(scene) else {
         return Vec::new();

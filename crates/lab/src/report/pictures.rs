@@ -11,7 +11,7 @@ use base64::engine::general_purpose::STANDARD;
 use crate::Error;
 use crate::study::{Combination, Files, Plan, Subject, exr, png};
 
-/// Values above those of this percentage of the pixels share the hottest colour.
+/// Percentile of the pixels above which all values share the hottest colour.
 const HOTTEST: f64 = 99.5;
 /// Steps of a scale of colours.
 const STEPS: usize = 256;

@@ -118,7 +118,7 @@ impl Combination {
         }
     }
 
-    /// What renderings use if nothing else is asked for.
+    /// What renderings use unless something else is chosen.
     pub fn default_of(width: Width) -> Self {
         Self {
             width,
@@ -201,7 +201,7 @@ impl Replay {
 }
 
 impl Plan {
-    /// The order of the trees and collapses that are not rendered by all orders: the default if it was asked for, or else
+    /// The order of the trees and collapses that are not rendered by all orders: the default if it was requested, or else
     /// the paper's.
     pub fn default_order(&self) -> Order {
         let preferred = [Order::default(), Order::SortPlus];
@@ -211,8 +211,8 @@ impl Plan {
         chosen.or(last).unwrap_or_default()
     }
 
-    /// The tree and the collapse that are rendered by all orders: the default ones if they are among those
-    /// asked for, otherwise the first ones.
+    /// The tree and the collapse that are rendered by all orders: the default ones if they were
+    /// requested, otherwise the first ones.
     pub fn base(&self) -> (Builder, Collapse) {
         (base_of(&self.trees), base_of(&self.collapses))
     }
@@ -262,7 +262,7 @@ impl Plan {
     }
 
     /// The two combinations of a width whose whole pictures are rendered apart: the unsorted trees of the paper and the
-    /// default, as far as they are asked for, or else `simple` and the default order on the base tree.
+    /// default, as far as they are requested, or else `simple` and the default order on the base tree.
     pub fn headline(&self, width: Width) -> Vec<Combination> {
         let all = self.rendered(width);
         let (tree, collapse) = self.base();

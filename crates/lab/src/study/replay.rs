@@ -19,7 +19,7 @@ use crate::counted::counted;
 use crate::thread_time;
 use crate::{CollapsedTree, Error, Lot, RaysFrom, SampledRays, TrainedTree};
 
-/// Rays from which a scene's number of shadow rays is told.
+/// Rays from which a scene's number of shadow rays is estimated.
 const PILOT: usize = 8192;
 /// No share of the rays is more than this: more teach nothing, and it is what renderings do.
 const MOST_SHARE: usize = 1 << 14;

@@ -21,7 +21,7 @@ pub struct Document<'a> {
     pub machine: Machine,
     /// Seed of all random values.
     pub seed: u64,
-    /// Whether there is a row for everything that was asked for, timed as often; if not, the study was
+    /// Whether there is a row for everything requested, timed as often; if not, the study was
     /// interrupted.
     pub complete: bool,
     /// The rows.

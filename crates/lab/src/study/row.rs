@@ -23,7 +23,7 @@ pub struct Row {
     pub part: Part,
     /// Kind of the rays that were measured.
     pub rays: Kind,
-    /// Triangles of the scene, those of an object once for every instance.
+    /// Triangles of the scene; an object counts once for every instance.
     pub triangles: usize,
     /// Children per node.
     pub width: usize,
@@ -51,7 +51,7 @@ pub struct Row {
     pub shadow_rays: Option<u64>,
     /// Share of shadow rays among all rays; null in a replay.
     pub shadow_share: Option<f64>,
-    /// Share of the measured rays that meet something.
+    /// Share of the measured rays that hit something.
     pub occluded_share: f64,
     /// Node tests of the training rays while they were logged; null in a replay and without learning.
     pub node_tests_before: Option<f64>,
@@ -114,7 +114,7 @@ pub struct Row {
     pub speed: Option<f64>,
     /// Least and most of the speeds of the rounds.
     pub speed_range: Option<[f64; 2]>,
-    /// Whether all answers were those of that tree, or of the first tree of a picture, bit for bit.
+    /// Whether all answers equal the answers of that tree, or of the first tree of a picture, bit for bit.
     pub equal_answers: Option<bool>,
     /// Hash of the image, as 16 hexadecimal digits; null in a replay, and of a tree whose answers differ.
     pub image_hash: Option<String>,
@@ -128,7 +128,7 @@ pub enum RenderTime {
     /// Composed of the tree's own queries and learning, and of the shading and the film that all trees of the
     /// picture share. Times of threads, divided by their number.
     Composed,
-    /// Measured by the clock, of a picture that was rendered with this tree alone.
+    /// Measured by the clock, of a picture that was rendered with only this tree.
     Measured,
 }
 

@@ -76,7 +76,7 @@ const ALWAYS: u64 = 1 << 20;
 
 /// Checks the memory that the JSON of a file needs, which is far more than its text: an empty node has two bytes.
 ///
-/// Brackets and commas in strings count, too. In a GLB, so do those of binary data, but only up to the JSON's length.
+/// Brackets and commas in strings count, too, as do such bytes in the binary data of a GLB up to the JSON's length.
 fn check_json(bytes: &[u8], max_bytes: u64) -> Result<(), Vec<String>> {
     let json = match bytes.strip_prefix(b"glTF") {
         Some(rest) => {

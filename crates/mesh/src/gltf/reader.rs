@@ -391,7 +391,7 @@ impl<'a> Reader<'a> {
 
     /// Checks that an accessor has elements of the given kind, all within its buffer, and returns their number.
     ///
-    /// The crate checks neither the kind nor overflow of positions. Do not ask it for elements if the number is 0.
+    /// The crate checks neither the kind nor overflow of positions. Do not call it for elements if the number is 0.
     fn check(
         &self,
         accessor: &Accessor,

@@ -497,7 +497,7 @@ fn cameras_and_lights_stand_where_their_nodes_are() {
     assert!(matches!(spot, Light::Spot { axis, .. } if *axis == Vec3::NEG_Z));
 }
 
-/// Coordinates transformed as the extension says, and turned upside down, are those of the mapping.
+/// The mapping gives the coordinates of the extension's transform, turned upside down.
 #[test]
 fn transformed_coordinates_follow_the_extension() {
     let bytes = antumbra_testkit::model::all_textures();

@@ -258,7 +258,7 @@ impl Faces {
         }
     }
 
-    /// Reads `v`, `v/vt`, `v//vn` or `v/vt/vn`. Negative numbers count back from what stands before.
+    /// Reads `v`, `v/vt`, `v//vn` or `v/vt/vn`. Negative numbers count back from the last element read.
     fn corner(
         &mut self,
         column: usize,

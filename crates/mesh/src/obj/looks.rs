@@ -50,7 +50,7 @@ fn alpha_of_exponent(exponent: f32) -> f32 {
 }
 
 impl Looks {
-    /// A material alone.
+    /// A material without emission or transparency.
     pub fn plain(material: Material) -> Self {
         Self {
             material,

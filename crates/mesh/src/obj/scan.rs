@@ -27,7 +27,7 @@ pub(super) fn text_after(line: &[u8], start: usize) -> String {
     String::from_utf8_lossy(rest.trim_ascii()).into_owned()
 }
 
-/// The known name that differs from `name` in letter case alone, or all names if they are few, as part of a sentence.
+/// The known name that differs from `name` only in letter case, or all names if they are few, as part of a sentence.
 pub(super) fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
     let mut known: Vec<&str> = known.collect();
     known.sort_unstable();
@@ -108,7 +108,7 @@ impl Mistakes {
         std::mem::take(&mut self.warnings)
     }
 
-    /// All mistakes in the order of their places, those of other files last.
+    /// All mistakes in the order of their places, mistakes in other files last.
     pub fn into_lines(mut self) -> Vec<String> {
         self.found.sort_by_key(|&(line, column, _)| (line, column));
         let path = self.path.display();

@@ -5,7 +5,7 @@
 //! - `points`: queries about points
 //!
 //! Nothing of Embree is needed to build or to run the program. The functions used are looked up in the
-//! shared library by name; their signatures and the layouts of what they take are those of the headers
+//! shared library by name; their signatures and the layouts of what they take follow the headers
 //! `embree4/rtcore_*.h` of versions 4.0 to 4.4. The library is never unloaded: threads of its task
 //! scheduler may still be running in it.
 
@@ -36,7 +36,7 @@ pub use moving::MovingMesh;
 pub use rays::{Packet, RayHit, SingleRay};
 pub use scene::Scene;
 
-/// An Embree object; which kind is told by where it came from.
+/// An Embree object of any kind; the function that returned it determines the kind.
 type Handle = *mut c_void;
 type MemoryMonitor = unsafe extern "C" fn(*mut c_void, isize, bool) -> bool;
 type BoundsFunction = unsafe extern "C" fn(*const BoundsArguments);

@@ -15,7 +15,7 @@ pub struct PointQuery {
 }
 
 /// `RTCPointQueryContext` of scenes without instances: nothing in it is looked at but the height of its stack, which is 0
-/// wherever it stands.
+/// at any place.
 #[repr(C, align(16))]
 pub struct PointContext([u32; 40]);
 

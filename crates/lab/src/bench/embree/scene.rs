@@ -45,7 +45,7 @@ pub struct Scene<'m> {
 }
 
 impl<'m> Scene<'m> {
-    /// Builds a scene of quality MEDIUM, Embree's default; `robust` asks for its watertight traversal. The
+    /// Builds a scene of quality MEDIUM, Embree's default; `robust` selects its watertight traversal. The
     /// device must have no other scene under construction, or bytes are mixed up.
     ///
     /// # Errors

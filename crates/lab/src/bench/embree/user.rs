@@ -71,7 +71,7 @@ pub unsafe extern "C" fn bounds(arguments: *const BoundsArguments) {
     }
 }
 
-/// For `rtcSetGeometryIntersectFunction`, of scenes that are asked about single rays.
+/// For `rtcSetGeometryIntersectFunction`, of scenes that are queried by single rays.
 pub unsafe extern "C" fn intersect(arguments: *const IntersectArguments) {
     // SAFETY: as above.
     let (arguments, shapes) = unsafe {
@@ -89,7 +89,7 @@ pub unsafe extern "C" fn intersect(arguments: *const IntersectArguments) {
     }
 }
 
-/// For `rtcSetGeometryOccludedFunction`, of scenes that are asked about single rays.
+/// For `rtcSetGeometryOccludedFunction`, of scenes that are queried by single rays.
 pub unsafe extern "C" fn occluded(arguments: *const OccludedArguments) {
     // SAFETY: as above.
     let (arguments, shapes) = unsafe {

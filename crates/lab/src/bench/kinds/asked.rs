@@ -1,4 +1,4 @@
-//! Our trees, asked with conditions on what counts.
+//! Our trees, queried with conditions on what counts.
 
 use antumbra::{Brute, Bvh, Hit, Masks, PrimId, Ray, Visit};
 
@@ -38,7 +38,7 @@ impl Condition<'_> {
     }
 }
 
-/// A tree, how it is asked, and what counts.
+/// A tree, the kind of query, and what counts.
 pub struct Asked<'t> {
     pub tree: &'t Tree,
     pub api: Api,

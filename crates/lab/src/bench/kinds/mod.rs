@@ -2,7 +2,7 @@
 //! points. Beside Embree, where it has the same.
 //!
 //! - this file: which rows there are;  `shapes`: one mesh as several kinds of geometry
-//! - `asked`: our trees, asked with conditions;  `moving`: refits;  `points`: what is near a point
+//! - `asked`: our trees, queried with conditions;  `moving`: refits;  `points`: what is near a point
 
 mod asked;
 mod moving;
@@ -43,7 +43,7 @@ pub struct Plan<'a> {
     pub embree: Option<Embree>,
 }
 
-/// Rows, and how often brute force was asked.
+/// Rows, and the number of rays that brute force answered.
 #[derive(Default)]
 pub struct Found {
     pub rows: Vec<KindRow>,
@@ -112,7 +112,7 @@ struct Entry<'a> {
     engine: Box<dyn Engine + 'a>,
 }
 
-/// Rows of everything that rays are asked about.
+/// Rows of all queries by rays.
 fn rays(
     plan: &Plan,
     mesh: &Merged,
@@ -264,7 +264,7 @@ fn row(blank: &KindRow, outcome: &Outcome, count: usize) -> KindRow {
     }
 }
 
-/// Compares answers with those of brute force, which tells whether anything counts and at which distance the first does.
+/// Compares answers with brute force, which returns whether anything counts and at which distance the first hit is.
 fn check(
     plan: &Plan,
     kind: &'static str,
