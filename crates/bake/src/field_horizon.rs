@@ -26,7 +26,7 @@ const BLOCK: usize = 32;
 /// Job of horizon angles of a height field: in each azimuth, the elevation of the highest surface as each observer sees it, in
 /// degrees, `[observers, azimuths]`. Azimuths are from the north of the map (`y`) through east.
 ///
-/// The surface is that of [`HeightField`], and all is computed in double precision. Where no surface is in the way, the angle is
+/// [`HeightField`] says what the surface is, and all is computed in double precision. Where no surface is in the way, the angle is
 /// -90. An eye below the surface has 90 everywhere. An observer that is not finite has NaN. Normals of observers do not count.
 pub struct FieldHorizonJob<'a> {
     field: &'a HeightField<'a>,

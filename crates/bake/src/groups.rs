@@ -13,10 +13,13 @@ use crate::{Mesh, Orientation, Sensors, Surface};
 /// Sides of the compass, clockwise from north.
 const SIDES: [&str; 8] = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
 
+/// Least cosine between the normals of a sensor and of the triangle that it is on.
+const FACING: f32 = 0.7;
+
 /// Groups of the triangles of a mesh. Each triangle is in one group.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Groups {
-    /// Names of the columns that tell groups apart.
+    /// Names of the columns that distinguish groups.
     pub columns: Vec<&'static str>,
     /// Texts of each group in these columns, in the order of the first triangles.
     pub names: Vec<Vec<String>>,
@@ -177,7 +180,7 @@ impl Mesh {
 
 impl Sensors {
     /// The triangle that each sensor is on, as shape and triangle of the tree: the first one behind the sensor, against its normal, or
-    /// below it for a sensor without one. `None` where there is none.
+    /// below it for a sensor without one. `None` where there is none, or where it faces elsewhere than the sensor.
     pub fn triangles(&self, bvh: &Bvh, orientation: &Orientation) -> Vec<Option<[u32; 2]>> {
         let bounds = bvh.bounds();
         let rays = self.points.iter().enumerate().map(|(index, point)| {
@@ -188,9 +191,16 @@ impl Sensors {
         let rays: Vec<Ray> = rays.collect();
         let mut hits = vec![None; rays.len()];
         bvh.intersect_batch(&rays, &mut hits);
-        let ids = hits.into_iter();
-        ids.map(|hit| hit.map(|hit| [hit.geom_id, hit.prim_id]))
-            .collect()
+        let found = rays.iter().zip(hits).map(|(ray, hit)| {
+            let hit = hit?;
+            // A ray that leaves by a gap of its own surface meets another one at a slant.
+            let normal = bvh.normal(ray, &hit)?;
+            let slant: f32 = normal.iter().zip(ray.dir).map(|(a, b)| a * b).sum();
+            let is_own = self.normals.is_empty()
+                || slant.abs() > FACING * length(ray.dir.map(f64::from)) as f32;
+            is_own.then_some([hit.geom_id, hit.prim_id])
+        });
+        found.collect()
     }
 }
 

@@ -32,7 +32,7 @@ fn elevation(level: usize) -> f64 {
 /// sky is seen.
 ///
 /// The result has an angle in degrees for each sensor and azimuth, `[sensors, azimuths]`: 90 below a surface, 0 on an open plain, and
-/// -90 where nothing is in the way. Points, normals and what is seen are those of [`sees_directions`], so what is behind the plane of
+/// -90 where nothing is in the way. [`sees_directions`] says what points with normals see, so what is behind the plane of
 /// a normal counts as a surface. A sensor without a normal of some length has the angle NaN.
 ///
 /// Rays are half a degree apart in elevation, so surfaces that are lower than that may be missed where they float above others.
@@ -46,7 +46,7 @@ pub struct HorizonJob {
 }
 
 impl HorizonJob {
-    /// The job of these sensors. `normals` are those of surfaces, or empty for points in free space. Azimuths are in degrees from
+    /// The job of these sensors. `normals` are of surfaces, or empty for points in free space. Azimuths are in degrees from
     /// north through east.
     ///
     /// # Errors

@@ -207,10 +207,55 @@ impl Sensors {
     }
 }
 
-/// Corners of a box in terms of east, north and up.
+/// Ends of a box in terms of east, north and up, which may run across it.
 fn extent(orientation: &Orientation, min: [f32; 3], max: [f32; 3]) -> ([f64; 3], [f64; 3]) {
-    let [a, b] = [min, max].map(|corner| orientation.local(corner.map(f64::from)));
-    let low = std::array::from_fn(|axis| a[axis].min(b[axis]));
-    let high = std::array::from_fn(|axis| a[axis].max(b[axis]));
+    let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    for corner in 0..8 {
+        let at = |axis: usize| {
+            if corner >> axis & 1 == 0 {
+                min[axis]
+            } else {
+                max[axis]
+            }
+        };
+        let place = orientation.local([0, 1, 2].map(|axis| f64::from(at(axis))));
+        for axis in 0..3 {
+            low[axis] = low[axis].min(place[axis]);
+            high[axis] = high[axis].max(place[axis]);
+        }
+    }
     (low, high)
+}
+
+#[cfg(test)]
+mod tests {
+    use antumbra::{Geometry, Recipe};
+
+    use super::*;
+
+    #[test]
+    fn grids_that_look_across_a_box_see_all_of_it() {
+        // Walls of a box of 4 x 4 x 2, without roof and floor.
+        let [a, b, c, d] = [[0.0, 0.0], [4.0, 0.0], [4.0, 4.0], [0.0, 4.0]];
+        let mut corners = Vec::new();
+        for [[x, y], [u, v]] in [[a, b], [b, c], [c, d], [d, a]] {
+            corners.extend([[x, y, 0.0], [u, v, 0.0], [u, v, 2.0]]);
+            corners.extend([[x, y, 0.0], [u, v, 2.0], [x, y, 2.0]]);
+        }
+        let indices: Vec<[u32; 3]> = (0..8).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let geometry = [Geometry::triangles(&corners[..], &indices[..])];
+        let bvh = Bvh::build(&geometry, &Recipe::default()).expect("a tree");
+        // From the south-east, both walls there are seen, and no other one.
+        let up = [0.0, 0.0, 1.0];
+        let view = Orientation::from_vectors([1.0, -1.0, 0.0], up).expect("a view");
+        let sensors = Sensors::on_grid(&bvh, 0.1, &view).expect("sensors");
+        let Layout::Grid(grid) = &sensors.layout else {
+            panic!("no grid");
+        };
+        assert_eq!((grid.width, grid.height), (57, 20), "4 √2 wide and 2 high");
+        assert!(sensors.points.len() > 55 * 20);
+        for [x, y, _] in sensors.points {
+            assert!(y.abs() < 1e-4 || (x - 4.0).abs() < 1e-4, "{x}, {y}");
+        }
+    }
 }

@@ -48,9 +48,8 @@ impl Legend<'_> {
         }
         let below_name = y + em * (1.25 * lines.len() as f32 + 0.35);
         let (thick, tip) = (1.3 * em, 0.9 * em);
-        let classes = self.steps.names.len();
-        let colours = if classes > 0 { classes } else { COLOURS };
-        let colour = |i: usize| palette::colour(i as f32 / (colours - 1).max(1) as f32);
+        let classes = self.steps.classes.len();
+        let colour = |i: usize| palette::colour(i as f32 / (COLOURS - 1) as f32);
         // A class has as much room as two lines of text.
         let length = match classes {
             0 => length,
@@ -61,12 +60,12 @@ impl Legend<'_> {
             Direction::Upright => (
                 [x, below_name + tip],
                 [thick, length - 2.0 * tip],
-                Rgb8Image::new(1, colours, (0..colours).rev().map(colour).collect())?,
+                Rgb8Image::new(1, COLOURS, (0..COLOURS).rev().map(colour).collect())?,
             ),
             Direction::Across => (
                 [x + tip, below_name],
                 [length - 2.0 * tip, thick],
-                Rgb8Image::new(colours, 1, (0..colours).map(colour).collect())?,
+                Rgb8Image::new(COLOURS, 1, (0..COLOURS).map(colour).collect())?,
             ),
         };
         if classes == 0 {
@@ -81,7 +80,7 @@ impl Legend<'_> {
                 ),
                 Direction::Across => ([at[0] + from * size[0], at[1]], [part * size[0], size[1]]),
             };
-            sheet.fill(rectangle(at, size), colour(class));
+            sheet.fill(rectangle(at, size), self.steps.classes[class].1);
         }
         sheet.outline(rectangle(at, size));
         let ([x0, y0], [x1, y1]) = (at, [at[0] + size[0], at[1] + size[1]]);
@@ -104,8 +103,8 @@ impl Legend<'_> {
         let (tick, line) = (0.3 * em, (0.08 * em).max(1.0));
         let ink = sheet.theme.text();
         for (index, &mark) in self.steps.marks.iter().enumerate() {
-            let (place, label) = match self.steps.names.get(index) {
-                Some(name) => ((index as f32 + 0.5) / classes as f32, name.clone()),
+            let (place, label) = match self.steps.classes.get(index) {
+                Some((name, _)) => ((index as f32 + 0.5) / classes as f32, name.clone()),
                 None => (self.steps.place(mark) as f32, self.steps.label(mark)),
             };
             let (mark, at, anchor) = match direction {

@@ -1,6 +1,6 @@
 //! Maps: values on a grid, and everything that a reader needs beside them.
 
-use antumbra_image::{Rgb8Image, palette};
+use antumbra_image::Rgb8Image;
 
 use crate::drawing::{Anchor, Drawing, Item, Weight, rectangle};
 use crate::layout::Layout;
@@ -189,8 +189,7 @@ impl Map<'_> {
         for row in 0..rows {
             for column in 0..columns {
                 let value = means.at(column, row);
-                let colour =
-                    (!value.is_nan()).then(|| palette::colour(self.steps.place(value) as f32));
+                let colour = (!value.is_nan()).then(|| self.steps.colour(value));
                 let shade = self.relief.as_ref().map(|relief| {
                     let x =
                         (column as f64 + 0.5) / columns as f64 * self.extent()[0] / relief.pixel;

@@ -1,5 +1,7 @@
 //! Rounded numbers of legends and scale bars.
 
+use antumbra_image::palette;
+
 /// Numbers of a legend: its ends and the steps between, all of them round.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Steps {
@@ -11,8 +13,8 @@ pub struct Steps {
     pub marks: Vec<f64>,
     /// Decimals of labels.
     pub decimals: usize,
-    /// Words of the marks instead of numbers: classes, whose colours do not run into each other. Empty for numbers.
-    pub names: Vec<String>,
+    /// Classes instead of numbers: names of the values 0, 1 and so on, with their colours. Empty for numbers.
+    pub classes: Vec<(String, [u8; 3])>,
 }
 
 /// Largest number of steps.
@@ -63,20 +65,40 @@ impl Steps {
             // Minus 0 would be written with its sign.
             marks: marks.map(|x| x + 0.0).collect(),
             decimals,
-            names: Vec::new(),
+            classes: Vec::new(),
         }
     }
 
-    /// Classes with names: the values 0, 1 and so on.
-    pub fn named(names: &[&str]) -> Self {
-        let high = names.len().saturating_sub(1).max(1) as f64;
+    /// Classes with names and colours: the values 0, 1 and so on.
+    pub fn classes(classes: &[(&str, [u8; 3])]) -> Self {
+        let named = classes
+            .iter()
+            .map(|&(name, colour)| (name.to_owned(), colour));
         Self {
             low: 0.0,
-            high,
-            marks: (0..names.len()).map(|i| i as f64).collect(),
+            high: classes.len().saturating_sub(1).max(1) as f64,
+            marks: (0..classes.len()).map(|i| i as f64).collect(),
             decimals: 0,
-            names: names.iter().map(|&name| name.to_owned()).collect(),
+            classes: named.collect(),
         }
+    }
+
+    /// Colour of a value: of viridis, or between the colours of two classes.
+    pub fn colour(&self, value: f64) -> [u8; 3] {
+        if self.classes.is_empty() {
+            return palette::colour(self.place(value) as f32);
+        }
+        let last = self.classes.len() - 1;
+        let value = value.clamp(0.0, last as f64);
+        let below = value.floor() as usize;
+        let [a, b] = [below, (below + 1).min(last)].map(|class| self.classes[class].1);
+        let part = value - below as f64;
+        let mix = |(&a, b): (&u8, u8)| f64::from(a) + part * (f64::from(b) - f64::from(a));
+        let mut colour = a;
+        for (own, mixed) in colour.iter_mut().zip(a.iter().zip(b).map(mix)) {
+            *own = mixed.round() as u8;
+        }
+        colour
     }
 
     /// Whether some of these values lie below and above the legend. NaN does not.
@@ -185,6 +207,19 @@ mod tests {
         assert_eq!(steps.beyond(&[-0.1, 1.0]), [true, false]);
         assert_eq!(steps.beyond(&[f32::NAN, 1.5]), [false, true]);
         assert_eq!(steps.beyond(&[f32::NEG_INFINITY]), [true, false]);
+    }
+
+    #[test]
+    fn classes_have_their_colours_and_mixtures_between() {
+        let steps = Steps::classes(&[("shadow", [0, 10, 20]), ("sun", [100, 110, 255])]);
+        assert_eq!(steps.colour(0.0), [0, 10, 20]);
+        assert_eq!(steps.colour(1.0), [100, 110, 255]);
+        assert_eq!(steps.colour(0.5), [50, 60, 138]);
+        assert_eq!(steps.colour(7.0), [100, 110, 255]);
+        assert_eq!(
+            Steps::between(0.0, 2.0, false).colour(2.0),
+            palette::colour(1.0)
+        );
     }
 
     #[test]

@@ -11,9 +11,9 @@ pub struct Part {
     pub triangles: usize,
 }
 
-/// Names of the surfaces of a [`Model`](crate::Model), in lists as long as those of the model.
+/// Names of the surfaces of a [`Model`](crate::Model), in lists as long as the lists of the model.
 ///
-/// Objects of OBJ are those of `o`, or of `g` in a file without `o`. Objects of glTF are the nodes.
+/// Lines `o` begin objects of OBJ, or lines `g` in a file without `o`. Nodes are objects of glTF.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Names {
     /// Parts of each shape of the world, which have all its triangles.
@@ -25,7 +25,7 @@ pub struct Names {
 }
 
 impl Names {
-    /// Parts of the shapes of the flattened scene: of those of the world, then of those of every instance.
+    /// Parts of the shapes of the flattened scene: first the shapes of the world, then the shapes of every instance.
     pub fn flattened(&self) -> Vec<Vec<Part>> {
         let mut all = self.shapes.clone();
         for (name, object) in &self.instances {

@@ -17,8 +17,8 @@ pub struct FactorArgs {
     /// Result: .csv or .npz
     ///
     /// May be given several times. A .csv has a line for each surface: its names, its area in squared units, its factor to every
-    /// surface, and the part that arrives nowhere. An .npz has the array factors with the last column for nowhere, areas, and surface:
-    /// that of each triangle. A shard is a .part.
+    /// surface, and the part that arrives nowhere. An .npz has the array factors with the last column for nowhere, the areas, and the
+    /// surface of each triangle. A shard is a .part.
     #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
     /// Figures as JSON; - is the standard output
@@ -26,7 +26,7 @@ pub struct FactorArgs {
     pub json: Option<Destination>,
     /// Surfaces: object, material or facade
     ///
-    /// Objects are those of `o` or else `g` in an .obj, and the nodes of a .gltf. Where nothing has a name, surfaces that touch are a
+    /// Lines `o`, or else `g`, begin objects in an .obj; nodes are objects in a .gltf. Where nothing has a name, surfaces that touch are a
     /// body. A facade is all of an object that faces one of eight sides of the compass; roofs, ground and undersides are surfaces too.
     #[arg(long, value_name = "KIND", value_enum, default_value_t = By::Object, hide_possible_values = true, help_heading = heading::WORK)]
     pub by: By,

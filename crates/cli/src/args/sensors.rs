@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::{heading, values};
 
-/// Flags that say where sensors are, and how the scene stands.
+/// Flags that say where sensors are, and where up and north are.
 #[derive(Debug, Args)]
 #[command(next_help_heading = heading::SENSORS)]
 pub struct PlaceArgs {
@@ -31,7 +31,7 @@ pub struct PlaceArgs {
     pub seen_from: Option<Side>,
     /// Only on one object of the scene, by its name
     ///
-    /// Objects are those of --by object. Everything else still casts shadows. With --grid or --surfaces.
+    /// As --by object names it. Everything else still casts shadows. With --grid or --surfaces.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["vertices", "sensors", "along"])]
     pub only: Option<String>,
     /// A sensor at every vertex

@@ -50,7 +50,7 @@ pub struct SunArgs {
     pub groups: Option<PathBuf>,
     /// object, material or facade
     ///
-    /// Objects are those of `o` or else `g` in an .obj, and the nodes of a .gltf. Where nothing has a name, surfaces that touch are a
+    /// Lines `o`, or else `g`, begin objects in an .obj; nodes are objects in a .gltf. Where nothing has a name, surfaces that touch are a
     /// body. A facade is all of an object that faces one of eight sides of the compass; roofs, ground and undersides have lines too.
     #[arg(long, value_name = "KIND", value_enum, default_value_t = By::Object, hide_possible_values = true, requires = "groups", help_heading = heading::OUTPUT)]
     pub by: By,

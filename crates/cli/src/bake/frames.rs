@@ -14,6 +14,9 @@ use crate::interrupt;
 /// Most maps of a command. A day in steps of a minute has fewer.
 const MOST: usize = 1500;
 
+/// Classes of places, with quiet colours: most of a map is one of them.
+const CLASSES: [(&str, [u8; 3]); 2] = [("shadow", [88, 98, 128]), ("sun", [250, 232, 176])];
+
 /// Time that a map is shown.
 const SECONDS: f32 = 0.2;
 
@@ -64,8 +67,8 @@ impl Baked<'_> {
             let lit: Vec<f32> = lit.collect();
             let begin = hourly.begin(step).unix(0.0);
             let middle = Moment::at_unix(begin + 1800.0 * suns.hours[sun], 0.0);
-            let words = self.words(("Sunlight", ""), Some(middle.to_string()));
-            sheet.draw(&words, &lit, Steps::named(&["shadow", "sun"]))
+            let words = self.words(("Sunlight", ""), Some(map::moment(&middle)));
+            sheet.draw(&words, &lit, Steps::classes(&CLASSES))
         };
         if !format(path)? {
             for (index, &step) in steps.iter().enumerate() {

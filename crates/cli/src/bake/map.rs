@@ -269,20 +269,27 @@ pub fn place(latitude: f64, longitude: f64) -> String {
     )
 }
 
+fn date(moment: &Moment) -> String {
+    let month = MONTHS[(moment.month as usize - 1).min(11)];
+    format!("{} {month} {}", moment.day, moment.year)
+}
+
+fn clock(moment: &Moment) -> String {
+    let minutes = (moment.seconds / 60.0).round() as u32;
+    format!("{:02}:{:02}", minutes / 60, minutes % 60)
+}
+
+/// A moment, as maps write it.
+pub fn moment(moment: &Moment) -> String {
+    format!("{}, {}", date(moment), clock(moment))
+}
+
 /// A time from one moment to another, as maps write it. Midnight at the end is the day before.
 pub fn period(from: &Moment, to: &Moment) -> String {
     let is_whole = from.seconds == 0.0 && matches!(to.seconds, 0.0 | DAY);
     let last = match to.seconds {
         0.0 => Moment::at_unix(to.unix(0.0) - 1.0, 0.0),
         _ => *to,
-    };
-    let date = |moment: &Moment| {
-        let month = MONTHS[(moment.month as usize - 1).min(11)];
-        format!("{} {month} {}", moment.day, moment.year)
-    };
-    let clock = |moment: &Moment| {
-        let minutes = (moment.seconds / 60.0).round() as u32;
-        format!("{:02}:{:02}", minutes / 60, minutes % 60)
     };
     let is_one_day = date(from) == date(&last);
     match (is_whole, is_one_day) {

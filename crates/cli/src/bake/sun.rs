@@ -336,14 +336,14 @@ impl Baked<'_> {
             Clock::Fixed(_) => format!("UTC{zone:+}"),
         };
         let mut subtitle: Vec<String> = time.into_iter().collect();
+        if let Some(side) = args.places.seen_from {
+            subtitle.push(format!("seen from the {}", side.name()));
+        }
         subtitle.extend([map::place(latitude, longitude), clock]);
         subtitle.extend(self.weather.map(str::to_owned));
         let mut title = format!("{quantity}, {}", self.ground.loaded.scene.name);
         if let Some(name) = &args.places.only {
             title += &format!(", {name}");
-        }
-        if let Some(side) = args.places.seen_from {
-            title += &format!(", seen from {}", side.name());
         }
         let files = [Some(&args.scene), args.epw.as_ref()];
         Words {

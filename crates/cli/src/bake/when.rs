@@ -37,7 +37,7 @@ fn midnight(year: i32) -> Moment {
     }
 }
 
-/// Hours that clocks may be apart from those of the sun. Kashgar in the west of China is the farthest, with 2.9.
+/// Hours that clocks may differ from the sun. Kashgar in the west of China is the farthest, with 2.9.
 const MOST_APART: f64 = 3.0;
 
 /// The place and its clocks.
@@ -77,7 +77,7 @@ impl When {
         Ok(when)
     }
 
-    /// Warns of clocks that are far from those of the sun: the time zone or the longitude is probably that of another place.
+    /// Warns of clocks that are far from the sun: the time zone or the longitude is probably of another place.
     fn warn_of_clocks(&self) {
         let Self { place, zone, .. } = self;
         let apart = zone - place.longitude / 15.0;
@@ -93,7 +93,7 @@ impl When {
         }
     }
 
-    /// The steps of time that the command line asks for.
+    /// The steps of time that the command line chooses.
     pub fn steps(
         &self,
         args: &SunArgs,

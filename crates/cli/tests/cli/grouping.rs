@@ -179,8 +179,9 @@ fn energies_are_means_times_areas() {
 fn objects_that_are_not_there_are_named() {
     let place = village();
     let flags = ["sun", "village.obj", "-o", "sun.csv", "--grid", "2"];
-    let run = place.run(&[&flags[..], &["--only", "barn"], &DAY].concat());
-    run.expect(2);
+    let run = place
+        .run(&[&flags[..], &["--only", "barn"], &DAY].concat())
+        .expect(2);
     assert!(
         run.stderr.contains("some are ground, mill, school hall"),
         "{}",
@@ -203,8 +204,9 @@ fn objects_that_are_not_there_are_named() {
         "--groups",
         "a.csv",
     ];
-    let run = place.run(&[&flags[..], &["--by", "material"], &DAY].concat());
-    run.expect(65);
+    let run = place
+        .run(&[&flags[..], &["--by", "material"], &DAY].concat())
+        .expect(65);
     assert!(
         run.stderr.contains("no material of the scene has a name"),
         "{}",
@@ -246,8 +248,9 @@ fn elevations_show_one_side_of_one_object() {
         !place.path("south.pgw").exists(),
         "an elevation is on no map"
     );
-    let run = place.run(&[&flags[..], &["-o", "a.tif"], &DAY].concat());
-    run.expect(2);
+    let run = place
+        .run(&[&flags[..], &["-o", "a.tif"], &DAY].concat())
+        .expect(2);
     assert!(
         run.stderr.contains("a raster needs --grid from above"),
         "{}",
