@@ -42,7 +42,7 @@ static void fill(void *memory, int type, size_t count) {
 }
 
 static void step(void) {
-    static const int kinds[] = {0, 0, 1, 50, 52, 121, 122, 24, 999};
+    static const int kinds[] = {0, 0, 1, 50, 52, 121, 122, 24, 999, 17, 25, 33, 59};
     static const int formats[] = {0x5001, 0x5003, 0x5004, 0x9003, 0x9004, 0x9134, 0x9244, 0x9001, 77};
     void **scene = &scenes[random_below(MANY)], **geometry = &geometries[random_below(MANY)];
     float numbers[16];
@@ -55,7 +55,7 @@ static void step(void) {
     for (int i = 0; i < 21 * 16; ++i) rays[i] = number();
     switch (random_below(22)) {
     case 0: if (*scene) rtcReleaseScene(*scene); *scene = rtcNewScene(device); break;
-    case 1: case 2: if (*geometry) rtcReleaseGeometry(*geometry); *geometry = rtcNewGeometry(device, kinds[random_below(9)]); break;
+    case 1: case 2: if (*geometry) rtcReleaseGeometry(*geometry); *geometry = rtcNewGeometry(device, kinds[random_below(13)]); break;
     case 3: case 4: case 5: {
         static const int types[] = {0, 1, 1, 2, 3, 23, 5};
         int type = types[random_below(7)], format = formats[random_below(9)];

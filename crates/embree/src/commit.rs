@@ -9,8 +9,9 @@ use antumbra::{
     Sphere, Width, World,
 };
 
-use crate::abi::{Bounds, INVALID, ProgressFunction, SCENE_DYNAMIC, SCENE_ROBUST};
+use crate::abi::{Bounds, INVALID, ProgressFunction, RtcRay, SCENE_DYNAMIC, SCENE_ROBUST};
 use crate::buffer::View;
+use crate::curves;
 use crate::device::{Callback, Device};
 use crate::failure::{Failure, Outcome};
 use crate::geometry::{Geometry, Kind, State};
@@ -49,6 +50,7 @@ pub struct Traits {
     pub has_occluded_filter: bool,
     pub takes_argument_filter: bool,
     pub has_user_geometry: bool,
+    pub has_curves: bool,
     /// Whether hits at the near end of a ray count: in robust scenes, and on everything but triangles and quads.
     pub near_is_closed: bool,
 }
@@ -61,6 +63,7 @@ impl Traits {
         has_occluded_filter: false,
         takes_argument_filter: false,
         has_user_geometry: false,
+        has_curves: false,
         near_is_closed: false,
     };
 
@@ -72,6 +75,7 @@ impl Traits {
             has_occluded_filter: state.occluded_filter.is_some(),
             takes_argument_filter: state.takes_argument_filter,
             has_user_geometry: placed.geometry.kind == Kind::User,
+            has_curves: matches!(placed.geometry.kind, Kind::Curves(_)),
             near_is_closed: !matches!(placed.geometry.kind, Kind::Triangles | Kind::Quads),
         }
     }
@@ -83,6 +87,7 @@ impl Traits {
             has_occluded_filter: self.has_occluded_filter | other.has_occluded_filter,
             takes_argument_filter: self.takes_argument_filter | other.takes_argument_filter,
             has_user_geometry: self.has_user_geometry | other.has_user_geometry,
+            has_curves: self.has_curves | other.has_curves,
             near_is_closed: self.near_is_closed | other.near_is_closed,
         }
     }
@@ -137,10 +142,13 @@ impl Committed {
         (&object.ground[geom_id as usize], Some(instance))
     }
 
-    /// Whether a hit counts for a ray with this mask.
-    pub fn counts(&self, mask: u32, hit: &Hit) -> bool {
+    /// Whether a hit counts for the mask of a ray and, on curves, by Embree's rule.
+    pub fn counts(&self, ray: &RtcRay, hit: &Hit) -> bool {
+        let mask = ray.mask;
         let (placed, instance) = self.find(hit.inst_id, hit.geom_id);
-        placed.state.mask & mask != 0 && instance.is_none_or(|instance| instance.mask & mask != 0)
+        placed.state.mask & mask != 0
+            && instance.is_none_or(|instance| instance.mask & mask != 0)
+            && curves::counts(placed, instance, ray, hit)
     }
 
     /// Whether a commit would find what the last one found.
@@ -411,6 +419,7 @@ fn kernel_geometry(placed: &Placed) -> Kernel<'static> {
             };
             Kernel::disks((0..count).map(disk).collect::<Vec<_>>())
         }
+        Kind::Curves(basis) => curves::kernel_curves(basis, state),
         Kind::User => {
             let count = if state.bounds.is_some() {
                 state.user_count

@@ -19,6 +19,7 @@
 mod abi;
 mod buffer;
 mod commit;
+mod curves;
 mod device;
 mod failure;
 mod filter;

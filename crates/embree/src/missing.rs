@@ -41,7 +41,7 @@ missing! {
     Geometry:
         rtcGetGeometryFace rtcGetGeometryFirstHalfEdge rtcGetGeometryNextHalfEdge rtcGetGeometryOppositeHalfEdge
         rtcGetGeometryPreviousHalfEdge rtcSetGeometryDisplacementFunction rtcSetGeometryMaxRadiusScale
-        rtcSetGeometrySubdivisionMode rtcSetGeometryTessellationRate rtcSetGeometryTimeRange
+        rtcSetGeometrySubdivisionMode rtcSetGeometryTimeRange
         rtcSetGeometryTopologyCount rtcSetGeometryVertexAttributeTopology;
 }
 

@@ -4,6 +4,7 @@ use antumbra::Hit;
 
 use crate::abi::RtcRay;
 use crate::commit::{Placed, PlacedInstance};
+use crate::curves::tangent;
 use crate::geometry::{Kind, State};
 use crate::query::in_object;
 
@@ -30,6 +31,7 @@ pub fn normal(
             std::array::from_fn(|axis| org[axis] + hit.t * dir[axis] - [x, y, z][axis])
         }
         Kind::Disks => item(state.normals.as_ref(), prim).unwrap_or([0.0; 3]),
+        Kind::Curves(basis) => tangent(basis, state, hit.prim_id, hit.u),
         Kind::User | Kind::Instance | Kind::InstanceArray => [0.0; 3],
     }
 }

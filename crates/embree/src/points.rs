@@ -1,11 +1,13 @@
 //! Point queries: functions of the client are called about primitives near a point, the nearest first.
 
+use std::collections::HashSet;
 use std::ffi::{c_int, c_void};
 
 use antumbra::ClosestPoint;
 
 use crate::abi::{PointArguments, PointContext, PointFunction, PointQuery};
 use crate::commit::Committed;
+use crate::curves::own_prim;
 use crate::failure::{Failure, Outcome};
 use crate::handle::look_mut;
 use crate::scene::{Scene, with};
@@ -40,9 +42,18 @@ unsafe fn visit(
         return Ok(false);
     };
     call(&nearest, &mut radius);
+    // A curve has several primitives of the kernel.
+    let id = |near: &ClosestPoint| {
+        let (placed, _) = committed.find(near.inst_id, near.geom_id);
+        (near.inst_id, near.geom_id, own_prim(placed, near.prim_id))
+    };
+    let mut called = HashSet::from([id(&nearest)]);
     for near in committed.bvh().within(point, radius) {
-        let id = |near: &ClosestPoint| (near.inst_id, near.geom_id, near.prim_id);
-        if near.distance <= radius && id(&near) != id(&nearest) {
+        let is_new = match committed.traits.has_curves {
+            true => called.insert(id(&near)),
+            false => !called.contains(&id(&near)),
+        };
+        if near.distance <= radius && is_new {
             call(&near, &mut radius);
         }
     }
@@ -94,7 +105,7 @@ unsafe fn call(
         let mut arguments = PointArguments {
             query,
             user,
-            prim_id: near.prim_id,
+            prim_id: own_prim(placed, near.prim_id),
             geom_id: placed.geom_id,
             context,
             similarity,

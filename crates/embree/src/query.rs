@@ -7,6 +7,7 @@ use antumbra::{Hit, Ray, Visit};
 
 use crate::abi::{Arguments, Context, RtcHit, RtcRay, RtcRayHit};
 use crate::commit::{Committed, PlacedInstance};
+use crate::curves;
 use crate::failure::Outcome;
 use crate::filter::{Filters, Query};
 use crate::geometry::Kind;
@@ -32,7 +33,7 @@ fn inside(ray: &RtcRay, t: f32) -> f32 {
 pub enum Way {
     /// Every hit counts.
     Plain,
-    /// Only hits count whose masks share a bit with that of the ray.
+    /// Only hits count whose masks share a bit with that of the ray, and on curves by Embree's rule.
     Masked,
     /// Functions of the client decide.
     Called,
@@ -74,7 +75,7 @@ impl Committed {
             });
         if is_called {
             Way::Called
-        } else if mask & traits.common_mask == 0 {
+        } else if mask & traits.common_mask == 0 || traits.has_curves {
             Way::Masked
         } else {
             Way::Plain
@@ -92,7 +93,7 @@ impl Committed {
                 let kernel = self.kernel_ray(ray);
                 let hit = (self.bvh().query(&kernel))
                     .mask(ray.mask)
-                    .filter(&|hit| self.counts(ray.mask, hit))
+                    .filter(&|hit| self.counts(ray, hit))
                     .intersect()?;
                 Some(self.found(ray, &hit, None))
             }
@@ -108,7 +109,7 @@ impl Committed {
                 let kernel = self.kernel_ray(ray);
                 (self.bvh().query(&kernel))
                     .mask(ray.mask)
-                    .filter(&|hit| self.counts(ray.mask, hit))
+                    .filter(&|hit| self.counts(ray, hit))
                     .occluded()
             }
             Way::Called => self.called(Query::Occluded, ray, arguments).is_some(),
@@ -152,7 +153,7 @@ impl Committed {
                     return Visit::Stop;
                 }
             }
-            if !self.counts(ray.mask, &hit) {
+            if !self.counts(ray, &hit) {
                 return Visit::Reject;
             }
             if decide(&hit, &mut accepted) {
@@ -198,14 +199,29 @@ impl Committed {
             (placed.geometry.kind == Kind::User)
                 .then(|| current.reported(&placed.geometry, hit.prim_id, hit.t))?
         });
+        let on_curve = match placed.geometry.kind {
+            Kind::Curves(basis) => curves::own_hit(basis, &placed.state, instance, ray, hit),
+            _ => None,
+        };
+        let (prim_id, t, u, v) = match &on_curve {
+            Some(own) => (own.prim, own.t, own.u, own.v),
+            None => (hit.prim_id, hit.t, hit.u, hit.v),
+        };
+        let hit = &Hit {
+            prim_id,
+            t,
+            u,
+            v,
+            ..*hit
+        };
         let own = RtcHit {
             ng: match &reported {
                 Some(reported) => reported.ng,
                 None => normal(placed, instance, ray, hit),
             },
-            u: hit.u,
-            v: hit.v,
-            prim_id: hit.prim_id,
+            u,
+            v,
+            prim_id,
             geom_id: placed.geom_id,
             ..RtcHit::MISS
         };

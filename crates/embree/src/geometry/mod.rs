@@ -12,6 +12,7 @@ use crate::abi::{
     BoundsFunction, FilterFunction, IntersectFunction, PointFunction, buffer_type, format,
 };
 use crate::buffer::{Buffer, View};
+use crate::curves::Basis;
 use crate::device::Device;
 use crate::failure::{Failure, Outcome, guarded};
 use crate::handle::{Handle, device_of, give, lock, look, release, retain, share};
@@ -25,6 +26,8 @@ pub enum Kind {
     Quads,
     Spheres,
     Disks,
+    /// Flat ones.
+    Curves(Basis),
     User,
     Instance,
     InstanceArray,
@@ -43,7 +46,13 @@ impl Kind {
             2 => return Err(unsupported("grids")),
             8 => return Err(unsupported("subdivision surfaces")),
             51 => return Err(unsupported("discs that face the ray")),
-            15..=17 | 24..=26 | 32..=34 | 40..=42 | 58..=60 => return Err(unsupported("curves")),
+            17 => Self::Curves(Basis::Linear),
+            25 => Self::Curves(Basis::Bezier),
+            33 => Self::Curves(Basis::BSpline),
+            59 => Self::Curves(Basis::CatmullRom),
+            15 | 16 | 24 | 32 | 40 | 58 => return Err(unsupported("round curves")),
+            26 | 34 | 42 | 60 => return Err(unsupported("curves with normals")),
+            41 => return Err(unsupported("Hermite curves")),
             _ => {
                 return Err(Failure::argument(format!(
                     "unknown type of geometry {kind}"
@@ -57,7 +66,7 @@ impl Kind {
         match self {
             Self::Triangles => Some(format::UINT3),
             Self::Quads => Some(format::UINT4),
-            Self::InstanceArray => Some(format::UINT),
+            Self::Curves(_) | Self::InstanceArray => Some(format::UINT),
             _ => None,
         }
     }
@@ -66,7 +75,7 @@ impl Kind {
     fn vertex_format(self) -> Option<u32> {
         match self {
             Self::Triangles | Self::Quads => Some(format::FLOAT3),
-            Self::Spheres | Self::Disks => Some(format::FLOAT4),
+            Self::Spheres | Self::Disks | Self::Curves(_) => Some(format::FLOAT4),
             _ => None,
         }
     }
@@ -108,6 +117,8 @@ pub struct State {
     pub mask: u32,
     pub is_enabled: bool,
     pub user_count: u32,
+    /// Quads of a cubic curve.
+    pub tessellation: u32,
     pub bounds: Option<BoundsFunction>,
     pub intersect: Option<IntersectFunction>,
     pub occluded: Option<IntersectFunction>,
@@ -132,6 +143,7 @@ impl State {
             mask: 1,
             is_enabled: true,
             user_count: 0,
+            tessellation: 4,
             bounds: None,
             intersect: None,
             occluded: None,
@@ -424,6 +436,26 @@ pub unsafe extern "C" fn rtcSetGeometryBuildQuality(geometry: *const Geometry, q
         with(geometry, (), |_| match quality {
             0..=3 => Ok(()),
             _ => Err(Failure::argument("invalid build quality")),
+        })
+    }
+}
+
+/// Number of quads of each cubic curve. A linear curve has none.
+///
+/// # Safety
+/// A geometry of this library, or null.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn rtcSetGeometryTessellationRate(geometry: *const Geometry, rate: f32) {
+    // SAFETY: the caller's handle.
+    unsafe {
+        with(geometry, (), |geometry| {
+            if !matches!(geometry.kind, Kind::Curves(_)) {
+                return Err(Failure::operation("operation only allowed for curves"));
+            }
+            geometry.change(|state| {
+                state.tessellation = (rate as u32).clamp(1, 16);
+                Ok(())
+            })
         })
     }
 }

@@ -38,9 +38,9 @@ void rtcIntersect1(void *, RayHit *, void *); void rtcOccluded1(void *, Ray *, v
 void rtcOccluded16(const int *, void *, Ray16 *, void *);
 void rtcOccluded1M(void *, Context *, Ray *, unsigned, size_t); void rtcIntersect1M(void *, Context *, RayHit *, unsigned, size_t);
 bool rtcPointQuery(void *, PointQuery *, PointContext *, bool (*)(PointArgs *), void *);
-void rtcCollide(void *, void *, void *, void *);
+void rtcCollide(void *, void *, void *, void *); void rtcSetGeometryTessellationRate(void *, float);
 
-enum { FLOAT3 = 0x9003, UINT3 = 0x5003, UINT4 = 0x5004, FLOAT3X4_COLUMN_MAJOR = 0x9234 };
+enum { FLOAT3 = 0x9003, FLOAT4 = 0x9004, UINT = 0x5001, UINT3 = 0x5003, UINT4 = 0x5004, FLOAT3X4_COLUMN_MAJOR = 0x9234 };
 
 #define CHECK(x) do { if (!(x)) { printf("line %d: %s\n", __LINE__, #x); exit(1); } } while (0)
 
@@ -254,6 +254,87 @@ static void user_geometry_and_points(void *device) {
     rtcReleaseScene(scene);
 }
 
+static bool count_call(PointArgs *args) {
+    *(unsigned *)args->user |= 1u << args->prim;
+    ++calls;
+    return false;
+}
+
+/* A scene with flat curves, each of which begins at every fourth point. */
+static void *strands(void *device, int kind, const float *points, unsigned count) {
+    void *scene = rtcNewScene(device), *geometry = rtcNewGeometry(device, kind);
+    CHECK(geometry != NULL);
+    memcpy(rtcSetNewGeometryBuffer(geometry, 1, 0, FLOAT4, 16, 4 * count), points, 64 * count);
+    unsigned *first = rtcSetNewGeometryBuffer(geometry, 0, 0, UINT, 4, count + 1);
+    for (unsigned i = 0; i < count; ++i) first[i] = 4 * i;
+    first[count] = 4 * count - 1; /* Its last point is out of range. */
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+    rtcReleaseGeometry(geometry);
+    rtcCommitScene(scene);
+    return scene;
+}
+
+static RayHit down_at(void *scene, float x, float y, float z, float length) {
+    RayHit hit = ray(x, y, z, 0, 0, -length);
+    Ray shadow = hit.ray;
+    Ray16 all;
+    int valid[16];
+    for (int lane = 0; lane < 16; ++lane) {
+        valid[lane] = -1;
+        for (int field = 0; field < 12; ++field) memcpy(&all.numbers[field][lane], (float *)&hit.ray + field, 4);
+    }
+    rtcIntersect1(scene, &hit, NULL);
+    rtcOccluded1(scene, &shadow, NULL);
+    rtcOccluded16(valid, scene, &all, NULL);
+    for (int lane = 0; lane < 16; ++lane) CHECK((all.numbers[8][lane] < 0) == (hit.hit.prim != ~0u));
+    CHECK((shadow.tfar < 0) == (hit.hit.prim != ~0u));
+    return hit;
+}
+
+static void curves(void *device) {
+    /* Two along x; every third number is a height of 0. */
+    static const float points[2][4][4] = {
+        {{0, 0, 0, 0.125f}, {1, 0, 0, 0.25f}, {2, 0, 0, 0.25f}, {3, 0, 0, 0.25f}},
+        {{0, 4, 0, 0.25f}, {1, 4, 0, 0.25f}, {2, 4, 0, 0.25f}, {3, 4, 0, 0.25f}}};
+    void *linear = strands(device, 17, points[0][0], 2);
+    RayHit hit = down_at(linear, 0.5f, 0.125f, 5, 1);
+    CHECK(hit.ray.tfar == 5 && hit.hit.prim == 0 && hit.hit.u == 0.5f && hit.hit.v == 0 && hit.hit.ng[0] == 1 && hit.hit.ng[1] == 0);
+    CHECK(down_at(linear, 0.5f, 4.125f, 5, 1).hit.prim == 1);
+    /* The radius is 3/16 in the middle. Both ends are round. */
+    CHECK(down_at(linear, 0.5f, 0.25f, 5, 1).hit.prim == ~0u && down_at(linear, 2, 0, 5, 1).hit.prim == ~0u);
+    CHECK(down_at(linear, -0.1f, 0, 5, 1).hit.u == 0 && down_at(linear, 1.2f, 0, 5, 1).hit.u == 1);
+    CHECK(down_at(linear, -0.1f, 0.1f, 5, 1).hit.prim == ~0u && down_at(linear, -0.2f, 0, 5, 1).hit.prim == ~0u);
+    /* Nothing is hit within two radii, whatever the length of the direction. */
+    CHECK(down_at(linear, 0.5f, 0, 0.37f, 1).hit.prim == ~0u && down_at(linear, 0.5f, 0, 0.38f, 1).hit.prim == 0);
+    CHECK(down_at(linear, 0.5f, 0, 0.37f, 0.25f).hit.prim == ~0u && down_at(linear, 0.5f, 0, 0.38f, 4).hit.prim == 0);
+
+    void *bezier = strands(device, 25, points[0][0], 2);
+    hit = down_at(bezier, 0.75f, 4.125f, 5, 1);
+    CHECK(hit.ray.tfar == 5 && hit.hit.prim == 1 && fabsf(hit.hit.u - 0.25f) < 1e-6f && fabsf(fabsf(hit.hit.v) - 0.5f) < 1e-6f && hit.hit.ng[0] == 3);
+    CHECK(hit.hit.v * down_at(bezier, 0.75f, 3.875f, 5, 1).hit.v < 0);
+    /* The ends are flat. */
+    CHECK(down_at(bezier, -0.1f, 4, 5, 1).hit.prim == ~0u && down_at(bezier, 2.9f, 4, 5, 1).hit.prim == 1);
+    CHECK(down_at(bezier, 0.5f, 4, 0.45f, 1).hit.prim == ~0u && down_at(bezier, 0.5f, 4, 0.55f, 1).hit.prim == 1);
+    CHECK(down_at(strands(device, 33, points[0][0], 2), 1.5f, 4, 5, 1).hit.u - 0.5f < 1e-6f);
+    CHECK(down_at(strands(device, 59, points[0][0], 2), 1.75f, 4, 5, 1).hit.u - 0.75f < 1e-6f);
+
+    PointQuery query = {{1.5f, 2, 0}, 0, 10};
+    PointContext context;
+    unsigned seen = 0;
+    memset(&context, 0, sizeof context);
+    calls = 0;
+    rtcPointQuery(bezier, &query, &context, count_call, &seen);
+    CHECK(calls == 2 && seen == 3);
+    void *triangles = rtcNewGeometry(device, 0);
+    CHECK(rtcGetDeviceError(device) == 0);
+    rtcSetGeometryTessellationRate(triangles, 2);
+    CHECK(rtcGetDeviceError(device) == 3);
+    rtcReleaseGeometry(triangles);
+    rtcReleaseScene(linear);
+    rtcReleaseScene(bezier);
+}
+
 static int last_code;
 static void note(void *user, int code, const char *text) { (void)user; last_code = text[0] ? code : -1; }
 
@@ -324,6 +405,7 @@ int main(void) {
     ends_of_intervals(device);
     masks_filters_instances(device);
     user_geometry_and_points(device);
+    curves(device);
     CHECK(rtcGetDeviceError(device) == 0);
     each_other(device);
     errors(device);
