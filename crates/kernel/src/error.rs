@@ -97,6 +97,58 @@ pub enum Error {
         /// The failure in the words of the system.
         message: String,
     },
+    /// A mesh or an instance that moves has another number of keys than the others, or none.
+    OtherKeys {
+        /// Singular of what has the keys.
+        what: &'static str,
+        /// Its number.
+        id: u32,
+        /// Keys of the others.
+        expected: usize,
+        /// Keys that were found.
+        found: usize,
+    },
+    /// A key of a mesh that moves has another number of vertices than the first one.
+    OtherVertices {
+        /// The geometry.
+        geom_id: u32,
+        /// The key, counted from 0.
+        key: u32,
+        /// Vertices of the first key.
+        expected: usize,
+        /// Vertices that were found.
+        found: usize,
+    },
+    /// A vertex of a mesh that moves is not finite, or beyond 2¹²⁵.
+    KeyPosition {
+        /// The geometry.
+        geom_id: u32,
+        /// The key, counted from 0.
+        key: u32,
+        /// The vertex.
+        vertex: usize,
+        /// Its position.
+        position: [f32; 3],
+    },
+    /// A transform of an instance that moves has a number that is not finite, or no inverse.
+    KeyTransform {
+        /// The instance.
+        inst_id: u32,
+        /// The key, counted from 0.
+        key: u32,
+    },
+    /// One of two transforms of an instance mirrors and the other does not, so that there is no way between.
+    KeysMirror {
+        /// The instance.
+        inst_id: u32,
+        /// The first of the two keys, counted from 0.
+        key: u32,
+    },
+    /// The path of an instance leaves the range of `f32`.
+    OutOfRange {
+        /// The instance.
+        inst_id: u32,
+    },
     /// A build was stopped by its [monitor](crate::BuildMonitor).
     Cancelled,
     /// A refit was asked for with another number of sound primitives than the tree was built over.
@@ -200,6 +252,46 @@ impl fmt::Display for Error {
             Self::Unreadable { what, why } => write!(f, "cannot read the {what}: {why}"),
             #[cfg(feature = "std")]
             Self::Io { message, .. } => write!(f, "{message}"),
+            Self::OtherKeys {
+                what,
+                id,
+                expected,
+                found,
+            } => write!(
+                f,
+                "{what} {id} has {found} keys, but needs 1 or {expected}, as everything that moves"
+            ),
+            Self::OtherVertices {
+                geom_id,
+                key,
+                expected,
+                found,
+            } => write!(
+                f,
+                "key {key} of mesh {geom_id} has {found} vertices, but key 0 has {expected}"
+            ),
+            Self::KeyPosition {
+                geom_id,
+                key,
+                vertex,
+                position: [x, y, z],
+            } => write!(
+                f,
+                "vertex {vertex} in key {key} of mesh {geom_id} is at ({x}, {y}, {z}): coordinates must be finite and below 2^125"
+            ),
+            Self::KeyTransform { inst_id, key } => write!(
+                f,
+                "key {key} of instance {inst_id} must be a finite transform that has an inverse"
+            ),
+            Self::KeysMirror { inst_id, key } => write!(
+                f,
+                "of the keys {key} and {} of instance {inst_id} one mirrors and the other does not",
+                key + 1
+            ),
+            Self::OutOfRange { inst_id } => write!(
+                f,
+                "the path of instance {inst_id} leaves the range of single precision"
+            ),
             Self::Cancelled => write!(f, "the build was cancelled"),
             Self::OtherPrimitives { expected, found } => write!(
                 f,

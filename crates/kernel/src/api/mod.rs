@@ -21,6 +21,7 @@ pub(crate) mod child_order;
 pub(crate) mod group;
 pub(crate) mod hit_lists;
 pub(crate) mod learning;
+pub(crate) mod moving;
 pub(crate) mod object;
 pub(crate) mod points;
 mod prefetch;

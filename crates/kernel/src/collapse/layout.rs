@@ -38,6 +38,7 @@ pub(crate) fn empty<const N: usize>() -> WideTree<N> {
         reach: 0.0,
         depth: 1,
         pick: Rule::Slots,
+        motion: None,
     }
 }
 
@@ -71,6 +72,7 @@ pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]
         reach: bounds.reach(),
         depth,
         pick: Rule::Slots,
+        motion: None,
     }
 }
 

@@ -87,6 +87,13 @@ impl Affine {
         }
     }
 
+    /// The columns in single precision, as [`Placement::object_from_world`] has them.
+    pub fn columns(&self) -> [[f32; 4]; 4] {
+        core::array::from_fn(|column| {
+            core::array::from_fn(|row| self.rows.get(row).map_or(0.0, |row| row[column] as f32))
+        })
+    }
+
     /// The inverse; `None` unless there is one, as far as double precision can tell.
     pub fn inverse(&self) -> Option<Self> {
         /// Well above the rounding of a determinant relative to the product of the lengths of the rows.
@@ -147,11 +154,7 @@ impl Placement {
         let inverse = world_from_object.inverse()?;
         let bounds = shape.placed(&world_from_object, &inverse);
         let placement = Self {
-            object_from_world: core::array::from_fn(|column| {
-                core::array::from_fn(|row| {
-                    inverse.rows.get(row).map_or(0.0, |row| row[column] as f32)
-                })
-            }),
+            object_from_world: inverse.columns(),
             reach: shape.reach,
             planes: [bounds.min, bounds.max].map(|[x, y, z]| [x, y, z, 0.0]),
             inst_id,
@@ -272,6 +275,22 @@ impl ObjectShape {
         }
     }
 
+    /// The corners of a box around the object.
+    pub fn corners(&self) -> [[f64; 3]; 8] {
+        let all = (self.boxes.iter()).fold(Aabb::EMPTY, |all, bounds| all.union(bounds));
+        core::array::from_fn(|octant| corner(&all, octant).map(f64::from))
+    }
+
+    /// Whether the object has no primitives.
+    pub fn is_empty(&self) -> bool {
+        self.boxes.is_empty()
+    }
+
+    /// Largest absolute coordinate of the object.
+    pub fn reach(&self) -> f32 {
+        self.reach
+    }
+
     /// How far the boxes reach in a direction.
     fn support(&self, direction: [f64; 3]) -> f64 {
         let octant = octant(direction);
@@ -301,7 +320,7 @@ impl ObjectShape {
 
     /// The box in the world: around every turned box, and wider by what the rays' way into the object and its
     /// rounding may be off: as much as a few roundings of every product of the two matrices.
-    fn placed(&self, world_from_object: &Affine, inverse: &Affine) -> Aabb {
+    pub fn placed(&self, world_from_object: &Affine, inverse: &Affine) -> Aabb {
         /// Four roundings of `f32`.
         const ROUNDING: f64 = 4.0 / (1u64 << 24) as f64;
         let rows = world_from_object.rows;

@@ -18,6 +18,7 @@
 //! - `masks`: which geometries and instances rays see
 //! - `nearest`: distances of points;  `near_test`: their lower bounds;  `winding`: how often a surface goes around a point
 //! - `local`: coordinates in double precision
+//! - `path`: transforms between keys;  `motion`: geometry that moves while rays are traced
 //! - `functions`: what files cannot hold
 
 pub(crate) mod best;
@@ -32,10 +33,12 @@ pub(crate) mod instance_ray;
 pub(crate) mod leaf_block;
 mod local;
 pub(crate) mod masks;
+pub(crate) mod motion;
 pub(crate) mod moved;
 pub(crate) mod near_test;
 pub(crate) mod nearest;
 mod nested;
+pub(crate) mod path;
 pub(crate) mod primitives;
 pub(crate) mod quad;
 pub(crate) mod ray_setup;
@@ -61,6 +64,7 @@ pub use disk::Disk;
 pub use functions::{Functions, GeometryId};
 pub use instance::Instance;
 pub use local::LocalOrigin;
+pub use motion::{MovingGeometry, MovingInstance, MovingMesh, MovingScene};
 pub use nested::NestedInstances;
 pub use user::{UserGeometry, UserHit};
 

@@ -12,7 +12,8 @@
 //! 7. `instrumented`: one ray after another, in any order (`pick`), while an observer counts or logs (`observe`).
 //! 8. `visit`: all hits of a ray, front to back; `several`: the nearest hits of many rays, in a stream; `conditional`: occlusion
 //!    under a `condition`.
-//! 9. `binary`: everything a ray meets in a binary tree.
+//! 9. `moving`: queries of trees that move, at the time of each ray.
+//! 10. `binary`: everything a ray meets in a binary tree.
 //!
 //! Points have queries of their own: `nearest`, what is near one, and `inside`, what is around one.
 //!
@@ -36,6 +37,7 @@ pub(crate) mod instrumented;
 mod leaf_places;
 pub(crate) mod locate;
 pub(crate) mod memory;
+pub(crate) mod moving;
 pub(crate) mod nearest;
 pub(crate) mod observe;
 pub(crate) mod packet;

@@ -1,6 +1,6 @@
 //! The two queries, occlusion and closest hit: the decisions in which their traversals differ.
 
-use antumbra_simd::{Scalar, Simd};
+use antumbra_simd::{Scalar, Simd, Width};
 
 use crate::geometry::best::Best;
 use crate::geometry::cutout::opacity::QueryKind;
@@ -15,8 +15,11 @@ use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
 use crate::trace::conditional::{improve_when, occluder_when};
 use crate::trace::pick::Children;
+use crate::trace::ray_batch::RayBatch;
 use crate::trace::stack::Stack;
-use crate::trace::step::{leaf_intersect, leaf_occluder, scalar_occluder};
+use crate::trace::step::{
+    NodeLanes, NodeMask, NodeTest, leaf_intersect, leaf_occluder, scalar_occluder,
+};
 use crate::tree::leaves::on_leaf;
 use crate::tree::node::Leaf;
 use crate::tree::wide::WideTree;
@@ -39,6 +42,12 @@ pub(crate) trait Query {
         Self::IDLE
     }
 
+    /// A ray of a batch begins.
+    #[inline(always)]
+    fn begin_in(batch: &RayBatch<'_>, index: usize) -> Self::State {
+        Self::begin(&batch.rays[index])
+    }
+
     /// A ray is at its end.
     fn finish(state: &Self::State) -> Self::Answer;
 
@@ -52,6 +61,26 @@ pub(crate) trait Query {
     #[inline(always)]
     fn limit(_: &Self::State, ray: &RaySetup) -> f32 {
         ray.tfar
+    }
+
+    /// Tests the boxes of a node.
+    #[inline(always)]
+    fn step<S: Simd + Width<N>, const N: usize>(
+        _: &Self::State,
+        simd: S,
+        bvh: &WideTree<N>,
+        index: usize,
+        test: &NodeTest<S, N>,
+        limit: f32,
+    ) -> (NodeMask<S, N>, NodeLanes<S, N>) {
+        test.step(simd, &bvh.nodes[index].planes, limit)
+    }
+
+    /// Asks for the memory of a node.
+    #[inline(always)]
+    fn prefetch<S: Simd, const N: usize>(simd: S, bvh: &WideTree<N>, index: usize) {
+        // No check: nothing is read.
+        simd.prefetch_at(bvh.nodes.as_ptr().wrapping_add(index));
     }
 
     /// A leaf is reached.
@@ -68,6 +97,19 @@ pub(crate) trait Query {
     #[inline(always)]
     fn enters(_: &Self::State, _: u32) -> bool {
         true
+    }
+
+    /// Makes `object` the ray in the object of instance `index`, unless the ray misses its box.
+    #[inline(always)]
+    fn place<S: Simd, const N: usize>(
+        _: &Self::State,
+        simd: S,
+        bvh: &WideTree<N>,
+        index: usize,
+        world: &RaySetup,
+        object: &mut RaySetup,
+    ) -> Option<Interval> {
+        bvh.instances[index].placement.enter(simd, world, object)
     }
 
     /// The ray goes into instance `index`.

@@ -21,6 +21,8 @@ pub(crate) struct RayBatch<'a> {
     after: Option<&'a [Hit]>,
     report: Report<'a>,
     is_alike: bool,
+    /// Per ray, its share of the way between two keys. Empty where nothing moves.
+    shares: &'a [f32],
 }
 
 /// Places of the rays in their batch.
@@ -69,6 +71,7 @@ impl<'a> RayBatch<'a> {
             after: None,
             report: Report::Nothing,
             is_alike: false,
+            shares: &[],
         }
     }
 
@@ -96,6 +99,18 @@ impl<'a> RayBatch<'a> {
     /// Neighbours are occluded by the same things, mostly.
     pub fn alike(self, is_alike: bool) -> Self {
         Self { is_alike, ..self }
+    }
+
+    /// Each ray at its share of the way between two keys.
+    pub fn at(self, shares: &'a [f32]) -> Self {
+        debug_assert_eq!(shares.len(), self.rays.len());
+        Self { shares, ..self }
+    }
+
+    /// Share of a ray of the way between two keys.
+    #[inline(always)]
+    pub fn share(&self, index: usize) -> f32 {
+        self.shares[index]
     }
 
     pub fn reporting(self, report: Report<'a>) -> Self {

@@ -63,7 +63,7 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
                     let limit = Q::limit(&state, ray);
                     // Made anew for every node: kept, its vectors would be spilled around every leaf.
                     let test = NodeTest::<S, N>::new(simd, fresh(ray));
-                    let (mask, entry) = test.step(simd, &node.planes, limit);
+                    let (mask, entry) = Q::step(&state, simd, bvh, index, &test, limit);
                     let next = Q::Item::push_pop(&mut stack, node, mask, entry);
                     // What comes after it is likely to be visited too: 5 % on sponza.
                     if let Some(item) = stack.peek() {
@@ -89,7 +89,7 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
         let placed = &bvh.instances[passage];
         let object = object.get_or_insert(RaySetup::IDLE);
         let entered = match Q::enters(&state, placed.placement.inst_id) {
-            true => placed.placement.enter(simd, world, object),
+            true => Q::place(&state, simd, bvh, passage, world, object),
             false => None,
         };
         next = match entered {

@@ -415,7 +415,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
                 let index = index as usize;
                 let ray = &self.batch.rays[index];
                 if self.setups[id].set(self.simd, ray, self.bvh.reach) {
-                    self.states[id] = Q::begin(ray);
+                    self.states[id] = Q::begin_in(self.batch, index);
                     if CAREFUL {
                         self.spaces[id] = Space::WORLD;
                     }
@@ -456,10 +456,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
 
     #[inline(always)]
     fn prefetch_node(&self, id: usize) {
-        // No check: nothing is read.
-        let nodes = self.bvh.nodes.as_ptr();
-        self.simd
-            .prefetch_at(nodes.wrapping_add(self.next[id] as usize));
+        Q::prefetch(self.simd, self.bvh, self.next[id] as usize);
     }
 
     /// A node step: tests the children of node `index` and pushes those that are hit.
@@ -469,7 +466,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
         let (node, ray) = (&self.bvh.nodes[index], &self.setups[id]);
         let limit = Q::limit(&self.states[id], ray);
         let test = NodeTest::<S, N>::new(self.simd, ray);
-        let (mask, entry) = test.step(self.simd, &node.planes, limit);
+        let (mask, entry) = Q::step(&self.states[id], self.simd, self.bvh, index, &test, limit);
         Q::Item::push(&mut stack, node, mask, entry);
         self.tops[id] = stack.top();
     }
@@ -501,7 +498,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
             let enters =
                 !self.decides || (self.batch).with_condition(self.ray_indices[id], may_count);
             let entered = match enters {
-                true => placed.placement.enter(self.simd, world, object),
+                true => Q::place(&self.states[id], self.simd, self.bvh, index, world, object),
                 false => None,
             };
             match entered {

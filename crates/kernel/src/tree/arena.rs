@@ -54,6 +54,7 @@ impl<const N: usize> WideTree<N> {
             reach: 0.0,
             depth: 1,
             pick: Rule::Slots,
+            motion: None,
         }
     }
 

@@ -5,6 +5,7 @@
 //! - `arena`: a tree put together from trees of objects;  `refit`: boxes and leaf blocks made anew
 //! - `validate`: a check of every promise of the wide tree;  `statistics`: its bytes and its cost
 //! - `width`: how many children a node has;  `any`: a tree of any width
+//! - `motion`: what moves between two keys
 //! - `saved`: trees as words;  `words`: the files that these words make
 //! - `slot_order`: a permutation of the slots of a tree;  `rule`: how queries pick
 
@@ -13,6 +14,7 @@ pub(crate) mod arena;
 pub(crate) mod binary;
 pub(crate) mod costs;
 pub(crate) mod leaves;
+pub(crate) mod motion;
 pub(crate) mod node;
 pub(crate) mod refit;
 pub(crate) mod rule;

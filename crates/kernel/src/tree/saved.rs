@@ -115,6 +115,7 @@ impl<const N: usize> WideTree<N> {
             reach,
             depth: 0,
             pick: Rule::Slots,
+            motion: None,
         };
         tree.pick = Rule::read(words, tree.nodes.len(), N)?;
         let walked = tree.walk(&boxes).map_err(|broken| words.error(broken))?;

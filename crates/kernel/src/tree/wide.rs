@@ -8,6 +8,7 @@ use crate::geometry::cutout::Filters;
 use crate::geometry::instance::Placement;
 use crate::shape::Shape;
 use crate::tree::leaves::LeafBlocks;
+use crate::tree::motion::Motion;
 use crate::tree::node::Node;
 use crate::tree::rule::Rule;
 use crate::tree::slot_order::{SlotOrder, occupied_first};
@@ -36,6 +37,8 @@ pub(crate) struct WideTree<const N: usize> {
     pub depth: usize,
     /// How occlusion queries pick the next child.
     pub pick: Rule,
+    /// What moves; then nodes and leaves are those of the start of a span.
+    pub motion: Option<Arc<Motion<N>>>,
 }
 
 /// An instance in a tree.

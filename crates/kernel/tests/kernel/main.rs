@@ -27,6 +27,7 @@
 //! - [`small`]: a little of everything, for an interpreter
 //! - [`world`]: objects that are built once and move;  [`refit`]: vertices that move
 //! - [`points`]: what is near a point, and what is around it
+//! - [`moving`]: scenes that move while rays are traced
 //! - [`monitor`]: builds that are watched, and stopped
 //! - [`support`], [`transforms`]: what these share
 
@@ -46,6 +47,7 @@ mod instances_learning;
 mod known_answers;
 mod learning;
 mod monitor;
+mod moving;
 mod oracle;
 mod orders;
 mod origin_offset;
