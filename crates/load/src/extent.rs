@@ -97,6 +97,9 @@ pub(crate) fn for_each_point(scene: &Scene, add: &mut impl FnMut(Vec3)) {
             let side = |axis: usize| if corner >> axis & 1 == 0 { low } else { high }[axis];
             let corner = Vec3::new(side(0), side(1), side(2));
             add(instance.world_from_object.transform_point3(corner));
+            if let Some(end) = instance.end {
+                add(end.transform_point3(corner));
+            }
         }
     }
 }

@@ -91,6 +91,8 @@ pub(crate) struct Builder<'o> {
     is_version4: bool,
     /// Time during which the shutter is open, of pbrt-v4.
     exposure: f32,
+    /// Times of the transformations at the start and at the end.
+    times: [f64; 2],
     /// Materials that pbrt-v4 defines after their use: places in the scene's list, and of the first uses.
     later_materials: HashMap<String, (usize, Span)>,
 }
@@ -140,6 +142,7 @@ impl<'o> Builder<'o> {
             budget: Budget::new(options.max_memory),
             is_version4: false,
             exposure: 1.0,
+            times: [0.0, 1.0],
             later_materials: HashMap::new(),
         }
     }
@@ -185,6 +188,9 @@ impl<'o> Builder<'o> {
             ..Times::default()
         };
         self.film.filter = self.filter;
+        let [start, end_time] = self.times;
+        let share = |time: f32| ((f64::from(time) - start) / (end_time - start)) as f32;
+        self.camera.shutter = self.camera.shutter.map(share);
         let scene = Scene {
             name,
             shapes: self.shapes,
@@ -200,6 +206,10 @@ impl<'o> Builder<'o> {
             accelerator: self.accelerator,
             origin: self.options.origin,
         };
+        if scene.moves() {
+            let message = "something moves while the shutter is open: pictures are blurred, everything else takes its beginning";
+            report.note(end, message);
+        }
         (scene, times)
     }
 
@@ -237,7 +247,7 @@ impl<'o> Builder<'o> {
             | D::PixelFilter(..)
             | D::Sampler(..)
             | D::Option(..)
-            | D::TransformTimes
+            | D::TransformTimes(..)
             | D::WorldBegin => Some(Phase::Options),
             D::AreaLightSource(..)
             | D::AttributeBegin
@@ -360,6 +370,17 @@ impl<'o> Builder<'o> {
         report.color_space = self.state.now.color_space;
     }
 
+    fn transform_times(&mut self, at: Span, times: [f64; 2], report: &mut Report) {
+        let [start, end] = times;
+        // Also when one is NaN.
+        if !(start < end && (end - start).is_finite()) {
+            let message = format!("the transform times {start} and {end} do not ascend");
+            report.error_help(at, message, "the start must be before the end");
+            return;
+        }
+        self.times = times;
+    }
+
     fn coord_sys_transform(&mut self, name: &Quoted, report: &mut Report) {
         match self.coordinate_systems.get(&name.text) {
             Some(system) => {
@@ -414,14 +435,18 @@ impl<'o> Builder<'o> {
 
     fn shape(&mut self, at: Span, kind: &Quoted, params: &Params, report: &mut Report) {
         let transforms = self.state.now.transforms;
-        if transforms.is_animated() {
-            report.unsupported(at, "moving shapes are");
+        let is_of_object = self.state.now.object.is_some();
+        if transforms.is_animated() && is_of_object {
+            report.unsupported(at, "moving shapes within objects are");
         }
+        // A shape that moves is an object of its own with one instance.
+        let moves = transforms.is_animated() && !is_of_object;
         // Objects come to the origin by their instances.
-        let is_near = self.state.now.object.is_some() || self.options.origin == DVec3::ZERO;
-        let to_world = match self.state.now.object {
-            Some(_) => transforms.start,
-            None => self.to_origin(transforms.start),
+        let is_near = is_of_object || moves || self.options.origin == DVec3::ZERO;
+        let to_world = match is_of_object {
+            true => transforms.start,
+            false if moves => DMat4::IDENTITY,
+            false => self.to_origin(transforms.start),
         };
         if !transform::is_invertible(&to_world) {
             report.error_once(at, SINGULAR, Some(SINGULAR_HELP));
@@ -455,8 +480,13 @@ impl<'o> Builder<'o> {
         let Some((source, cutouts)) = read else {
             return;
         };
-        let is_of_object = self.state.now.object.is_some();
         let area_light = self.state.now.area_light.clone();
+        if moves && area_light.is_some() {
+            report.note(
+                at,
+                "area lights of shapes that move are left out, as in pbrt-v3",
+            );
+        }
         if is_of_object && area_light.is_some() {
             report.note(
                 at,
@@ -484,7 +514,7 @@ impl<'o> Builder<'o> {
         let shape = Shape {
             geometry,
             material,
-            area_light: area_light.filter(|_| !is_of_object),
+            area_light: area_light.filter(|_| !is_of_object && !moves),
             media,
             alpha: cutouts.alpha,
             shadow_alpha: cutouts.shadow_alpha,
@@ -494,8 +524,16 @@ impl<'o> Builder<'o> {
         if shape.area_light.is_some() && matches!(shape.alpha, Some(Param::Constant(_))) {
             report.unsupported(at, "an invisible light (\"alpha\" 0) is");
         }
+        if moves {
+            let is_sphere = matches!(shape.geometry, Geometry::Sphere(_));
+            let Some(instance) = self.instance(at, self.objects.len(), is_sphere, report) else {
+                return;
+            };
+            self.objects.push(Object::default());
+            self.instances.push(instance);
+        }
         // Objects are never nested, so the last one is the open one.
-        let object = is_of_object.then(|| self.objects.len() - 1);
+        let object = (is_of_object || moves).then(|| self.objects.len() - 1);
         let shapes = match object {
             Some(object) => &mut self.objects[object].shapes,
             None => &mut self.shapes,
@@ -587,7 +625,7 @@ impl Handler for Builder<'_> {
             }
             D::CoordSysTransform(name) => self.coord_sys_transform(&name, report),
             D::ActiveTransform(active) => self.transforms().active = active,
-            D::TransformTimes => report.note(at, "TransformTimes is left out: nothing moves"),
+            D::TransformTimes(times) => self.transform_times(at, times, report),
             D::Camera(kind, params) => self.camera(at, &kind, &params, report),
             D::Film(kind, params) => self.film = film::declare(at, &kind, &params, report),
             D::PixelFilter(kind, params) => {
@@ -623,14 +661,22 @@ impl Handler for Builder<'_> {
                 value_type,
                 class,
                 params,
-            } => self.pending_textures.push(texture::Declaration {
-                at,
-                name,
-                value_type,
-                class,
-                params,
-                space: self.texture_space(),
-            }),
+            } => {
+                if self.transforms().is_animated() {
+                    report.note(
+                        at,
+                        "textures do not move: the start of the transformation is theirs",
+                    );
+                }
+                self.pending_textures.push(texture::Declaration {
+                    at,
+                    name,
+                    value_type,
+                    class,
+                    params,
+                    space: self.texture_space(),
+                });
+            }
             D::Attribute(group, params) => {
                 version4::attribute(group, params, &mut self.state, report);
             }

@@ -1,14 +1,14 @@
 //! Directive for the camera, with the parameters and defaults of pbrt-v3.
 
 use antumbra_scene::{Camera, Projection};
-use glam::{DMat4, DVec3, Mat3A};
+use glam::{DMat4, DVec3, DVec4, Mat3A, Mat4};
 
 use crate::directive::Quoted;
 use crate::lookup::Lookup;
 use crate::params::{ParamType, Params};
 use crate::report::Report;
 use crate::source::Span;
-use crate::state::Transforms;
+use crate::state::{MIRRORS, MIRRORS_HELP, Transforms};
 use crate::{suggest, transform};
 
 /// Supported cameras.
@@ -26,10 +26,72 @@ pub(crate) fn declare(
     report: &mut Report,
 ) -> (Camera, DMat4) {
     let mut lookup = Lookup::new(at, format!("camera {:?}", kind.text), params);
+    let (matrix, world_from_camera) = world_from_camera_of(at, transforms.start, origin, report);
+    let mut end = None;
     if transforms.is_animated() {
-        report.unsupported(at, "a moving camera is");
+        let (matrix, _) = world_from_camera_of(at, transforms.end, origin, report);
+        end = Some(matrix);
+        if transforms.mirror_differently() {
+            report.error_help(at, MIRRORS, MIRRORS_HELP);
+        } else if [transforms.start, transforms.end]
+            .iter()
+            .any(|matrix| matrix.row(3) != DVec4::W)
+        {
+            report.unsupported(at, "a moving camera under a perspective transformation is");
+        }
     }
-    let camera_from_world = transforms.start;
+    let mut camera = Camera::default();
+    match kind.text.as_str() {
+        "perspective" => camera = perspective(&mut lookup, report),
+        "orthographic" => {
+            let plane = plane(&mut lookup, report);
+            camera = Camera {
+                projection: Projection::Orthographic,
+                ..plane
+            };
+        }
+        "environment" => {
+            // As in pbrt-v3, which reads the others without effect.
+            camera.shutter = plane(&mut lookup, report).shutter;
+            camera.projection = Projection::Spherical;
+        }
+        "spherical" if report.is_version4 => {
+            camera.shutter = plane(&mut lookup, report).shutter;
+            camera.projection = lookup.choice(
+                "mapping",
+                [
+                    ("equalarea", Projection::EqualArea),
+                    ("equirectangular", Projection::Spherical),
+                ],
+                report,
+            );
+        }
+        name if UNSUPPORTED.contains(&name) => {
+            report.unsupported_kind(kind.span, "camera", name, SUPPORTED);
+            lookup.ignore_all();
+        }
+        name => {
+            report.error_help(
+                kind.span,
+                format!("unknown camera {name:?}"),
+                suggest::help(name, SUPPORTED),
+            );
+            lookup.ignore_all();
+        }
+    }
+    lookup.finish(report);
+    camera.world_from_camera = matrix;
+    camera.end = end;
+    (camera, world_from_camera)
+}
+
+/// Camera to world space, measured from `origin` and in single precision, and as the file has it in double precision.
+fn world_from_camera_of(
+    at: Span,
+    camera_from_world: DMat4,
+    origin: DVec3,
+    report: &mut Report,
+) -> (Mat4, DMat4) {
     let world_from_camera = if transform::is_invertible(&camera_from_world) {
         camera_from_world.inverse()
     } else {
@@ -55,48 +117,7 @@ pub(crate) fn declare(
             "the factors of a Scale must not be so small or so large",
         );
     }
-    let mut camera = Camera::default();
-    match kind.text.as_str() {
-        "perspective" => camera = perspective(&mut lookup, report),
-        "orthographic" => {
-            let plane = plane(&mut lookup, report);
-            camera = Camera {
-                projection: Projection::Orthographic,
-                ..plane
-            };
-        }
-        "environment" => {
-            // As in pbrt-v3, which reads them without effect.
-            let _ = plane(&mut lookup, report);
-            camera.projection = Projection::Spherical;
-        }
-        "spherical" if report.is_version4 => {
-            let _ = plane(&mut lookup, report);
-            camera.projection = lookup.choice(
-                "mapping",
-                [
-                    ("equalarea", Projection::EqualArea),
-                    ("equirectangular", Projection::Spherical),
-                ],
-                report,
-            );
-        }
-        name if UNSUPPORTED.contains(&name) => {
-            report.unsupported_kind(kind.span, "camera", name, SUPPORTED);
-            lookup.ignore_all();
-        }
-        name => {
-            report.error_help(
-                kind.span,
-                format!("unknown camera {name:?}"),
-                suggest::help(name, SUPPORTED),
-            );
-            lookup.ignore_all();
-        }
-    }
-    lookup.finish(report);
-    camera.world_from_camera = matrix;
-    (camera, world_from_camera)
+    (matrix, world_from_camera)
 }
 
 fn perspective(lookup: &mut Lookup, report: &mut Report) -> Camera {
@@ -121,12 +142,17 @@ fn perspective(lookup: &mut Lookup, report: &mut Report) -> Camera {
 /// Shutter, screen window and lens, which cameras share.
 fn plane(lookup: &mut Lookup, report: &mut Report) -> Camera {
     let defaults = Camera::default();
-    for name in ["shutteropen", "shutterclose"] {
-        match report.is_version4 {
-            // The film knows how long the shutter is open.
-            true => drop(lookup.find(name, &[ParamType::Float])),
-            false => lookup.left_out(name, &[ParamType::Float], "nothing moves", report),
-        }
+    let mut shutter = [
+        lookup.float("shutteropen", defaults.shutter[0], report),
+        lookup.float("shutterclose", defaults.shutter[1], report),
+    ];
+    // In version 4 the film has refused such times.
+    if shutter[1] < shutter[0] && !report.is_version4 {
+        report.note(
+            lookup.at,
+            "the shutter closes before it opens: the times are exchanged",
+        );
+        shutter.reverse();
     }
     let screen_window = lookup.floats::<4>("screenwindow", report);
     if let Some(window @ [x0, x1, y0, y1]) = screen_window
@@ -139,6 +165,7 @@ fn plane(lookup: &mut Lookup, report: &mut Report) -> Camera {
     let has_aspect = lookup.has("frameaspectratio");
     let frame_aspect_ratio = lookup.float_in("frameaspectratio", 1.0, aspect, report);
     Camera {
+        shutter,
         screen_window,
         frame_aspect_ratio: has_aspect.then_some(frame_aspect_ratio),
         lens_radius: lookup.float_in("lensradius", 0.0, [0.0, f32::MAX], report),

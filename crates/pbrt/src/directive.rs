@@ -69,8 +69,8 @@ pub(crate) enum Directive {
     Transform([f64; 16]),
     TransformBegin,
     TransformEnd,
-    /// Times of the transformations. The numbers are dropped, because they matter only in animated scenes.
-    TransformTimes,
+    /// Times of the transformations at the start and at the end.
+    TransformTimes([f64; 2]),
     Translate([f64; 3]),
     WorldBegin,
     WorldEnd,

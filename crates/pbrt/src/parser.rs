@@ -364,10 +364,7 @@ fn directive(
         "Transform" => Directive::Transform(matrix(lexer, report, at)?),
         "TransformBegin" => Directive::TransformBegin,
         "TransformEnd" => Directive::TransformEnd,
-        "TransformTimes" => {
-            numbers::<2>(lexer, report, at)?;
-            Directive::TransformTimes
-        }
+        "TransformTimes" => Directive::TransformTimes(numbers(lexer, report, at)?),
         "Translate" => Directive::Translate(numbers(lexer, report, at)?),
         "WorldBegin" => Directive::WorldBegin,
         "WorldEnd" => Directive::WorldEnd,

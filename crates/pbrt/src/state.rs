@@ -9,6 +9,12 @@ use glam::{DMat3, DMat4};
 use crate::directive::{ActiveTransform, Quoted};
 use crate::params::Params;
 use crate::source::Span;
+use crate::transform;
+
+/// Message for transformations that nothing can move between.
+pub(crate) const MIRRORS: &str =
+    "of the transformations at the start and at the end, one mirrors and the other does not";
+pub(crate) const MIRRORS_HELP: &str = "negative factors of Scale belong under ActiveTransform All";
 
 /// Current transformation at the start and at the end of the exposure.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +49,11 @@ impl Transforms {
     pub fn set(&mut self, [start, end]: [DMat4; 2]) {
         self.start = start;
         self.end = end;
+    }
+
+    /// Returns true if one of the two mirrors and the other does not, so that nothing can move from one to the other.
+    pub fn mirror_differently(&self) -> bool {
+        transform::swaps_handedness(&self.start) != transform::swaps_handedness(&self.end)
     }
 
     /// Returns true if the two transformations differ.

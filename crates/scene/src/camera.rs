@@ -11,6 +11,11 @@ use serde::Serialize;
 pub struct Camera {
     /// Camera space to world space.
     pub world_from_camera: Mat4,
+    /// Camera space to world space at time 1, if the camera moves; `world_from_camera` is then that of time 0. Between, it moves
+    /// as an [`Instance`](crate::Instance) does.
+    pub end: Option<Mat4>,
+    /// Times at which the shutter opens and closes. Times before 0 and after 1 see what there is at 0 and 1.
+    pub shutter: [f32; 2],
     /// How directions become points of the picture.
     pub projection: Projection,
     /// Full angle of view over the *shorter* side of the screen window, in degrees, in (0, 180). Of perspective only.
@@ -55,6 +60,8 @@ impl Default for Camera {
     fn default() -> Self {
         Self {
             world_from_camera: Mat4::IDENTITY,
+            end: None,
+            shutter: [0.0, 1.0],
             projection: Projection::Perspective,
             fov: 90.0,
             screen_window: None,

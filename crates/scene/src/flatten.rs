@@ -31,6 +31,11 @@ pub enum Error {
         /// Name of the object.
         object: String,
     },
+    /// An instance moves.
+    Moves {
+        /// Position of the instance in the scene.
+        instance: usize,
+    },
     /// The flattened scene would have more than [`MAX_FLAT_TRIANGLES`] triangles.
     TooLarge {
         /// Number of triangles of the flattened scene.
@@ -55,6 +60,10 @@ impl fmt::Display for Error {
                 f,
                 "instance {instance}, of {object:?}, scales a sphere differently by axis; spheres need a uniform \
                  scale"
+            ),
+            Self::Moves { instance } => write!(
+                f,
+                "instance {instance} moves while the shutter is open; flattened scenes stand still"
             ),
             Self::TooLarge {
                 triangles,
@@ -82,6 +91,9 @@ impl Scene {
     pub fn flattened(&self) -> Result<Cow<'_, Self>, Error> {
         if self.instances.is_empty() {
             return Ok(Cow::Borrowed(self));
+        }
+        if let Some(instance) = self.instances.iter().position(|one| one.end.is_some()) {
+            return Err(Error::Moves { instance });
         }
         self.check_size()?;
         let mut shapes = self.shapes.clone();

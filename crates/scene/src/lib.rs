@@ -119,6 +119,11 @@ impl Scene {
         self.shapes.iter().chain(of_instances.flatten())
     }
 
+    /// Whether an instance or the camera moves while the shutter is open.
+    pub fn moves(&self) -> bool {
+        self.camera.end.is_some() || self.instances.iter().any(|one| one.end.is_some())
+    }
+
     /// Number of triangles in the world; triangles of an object count once per instance, those of area lights too.
     pub fn triangle_count(&self) -> usize {
         triangles(self.standing_shapes())

@@ -125,6 +125,7 @@ mod tests {
         let place = |x: f32| Instance {
             object: 0,
             world_from_object: glam::Affine3::from_translation(Vec3::X * x),
+            end: None,
         };
         scene.instances = vec![place(4.0), place(8.0)];
         prepare(&mut scene);

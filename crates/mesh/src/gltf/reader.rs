@@ -128,6 +128,7 @@ impl<'a> Reader<'a> {
                 self.model.instances.push(Instance {
                     object,
                     world_from_object: Affine3::from_mat4(matrix.as_mat4()),
+                    end: None,
                 });
             }
             // Lights of instances would be dark.

@@ -8,6 +8,7 @@ use crate::directive::Quoted;
 use crate::report::Report;
 use crate::source::Span;
 use crate::state::BlockKind;
+use crate::state::{MIRRORS, MIRRORS_HELP};
 use crate::{suggest, transform};
 
 impl Builder<'_> {
@@ -48,30 +49,51 @@ impl Builder<'_> {
             );
             return;
         };
+        let has_spheres = self.objects[object].has_spheres();
+        let Some(instance) = self.instance(at, object, has_spheres, report) else {
+            return;
+        };
+        if self.budget.take(size_of::<Instance>() as u64, at, report) {
+            self.instances.push(instance);
+        }
+    }
+
+    /// An instance under the current transformations; `None` after a mistake.
+    pub(super) fn instance(
+        &self,
+        at: Span,
+        object: usize,
+        has_spheres: bool,
+        report: &mut Report,
+    ) -> Option<Instance> {
         let transforms = self.state.now.transforms;
-        if transforms.is_animated() {
-            report.unsupported(at, "moving instances are");
+        let mut places = [Affine3::IDENTITY; 2];
+        for (place, matrix) in places.iter_mut().zip([transforms.start, transforms.end]) {
+            // Rounded before the checks, because the scene stores single precision.
+            let to_world = self.to_origin(matrix).as_mat4().as_dmat4();
+            if !transform::is_invertible(&to_world) {
+                report.error_once(at, SINGULAR, Some(SINGULAR_HELP));
+                return None;
+            }
+            if to_world.row(3) != DVec4::W {
+                report.unsupported(at, "an instance under a perspective transformation is");
+                return None;
+            }
+            if transform::uniform_scale(&to_world).is_none() && has_spheres {
+                report.unsupported(at, ELLIPSOID);
+                return None;
+            }
+            *place = Affine3::from_mat4(to_world.as_mat4());
         }
-        // Rounded before the checks, because the scene stores single precision.
-        let to_world = self.to_origin(transforms.start).as_mat4().as_dmat4();
-        if !transform::is_invertible(&to_world) {
-            report.error_once(at, SINGULAR, Some(SINGULAR_HELP));
-            return;
+        let [world_from_object, end] = places;
+        if transforms.mirror_differently() {
+            report.error_help(at, MIRRORS, MIRRORS_HELP);
+            return None;
         }
-        if to_world.row(3) != DVec4::W {
-            report.unsupported(at, "an instance under a perspective transformation is");
-            return;
-        }
-        if transform::uniform_scale(&to_world).is_none() && self.objects[object].has_spheres() {
-            report.unsupported(at, ELLIPSOID);
-            return;
-        }
-        if !self.budget.take(size_of::<Instance>() as u64, at, report) {
-            return;
-        }
-        self.instances.push(Instance {
+        Some(Instance {
             object,
-            world_from_object: Affine3::from_mat4(to_world.as_mat4()),
-        });
+            world_from_object,
+            end: transforms.is_animated().then_some(end),
+        })
     }
 }

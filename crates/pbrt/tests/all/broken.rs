@@ -150,7 +150,7 @@ WorldBegin WorldEnd"#, r#"16 numbers in [ ]"#),
         (r#"WorldBegin ›Shape "curve" "string type" "ribbon" "point P" [0 0 0 1 0 0 2 0 0 3 0 0] WorldEnd"#, r#"needs 2 normals "N", found 0"#),
         (r#"WorldBegin AreaLightSource "diffuse" ›Shape "curve" "point P" [0 0 0 1 0 0 2 0 0 3 0 0] WorldEnd"#, r#"area light on a curve"#),
         (r#"WorldBegin Scale 1 0 1 ›Shape "sphere" WorldEnd"#, r#"cannot be inverted"#),
-        (r#"WorldBegin ActiveTransform EndTime Translate 1 0 0 ›Shape "sphere" WorldEnd"#, r#"moving shapes"#),
+        (r#"WorldBegin ObjectBegin "a" ActiveTransform EndTime Translate 1 0 0 ›Shape "sphere" ObjectEnd WorldEnd"#, r#"moving shapes within objects"#),
         (r#"WorldBegin Shape "trianglemesh" "point P" [0 0 0] "integer indices" [0
  0 ›1] WorldEnd"#, r#"vertex index 1 is out of range: "P" has 1 points"#),
         (r#"WorldBegin Shape "trianglemesh" "point P" [0 0 0] "integer indices" [0 ›-1 0] WorldEnd"#, r#"vertex index -1"#),
@@ -184,7 +184,11 @@ TransformBegin ›AttributeEnd WorldEnd"#, r#"TransformBegin in line 2"#),
         (r#"WorldBegin ObjectBegin "a" ObjectEnd Scale 1e30 1e30 1e30 Scale 1e30 1 1 ›ObjectInstance "a" WorldEnd"#, r#"cannot be inverted"#),
         (r#"WorldBegin ObjectBegin "a" ObjectEnd Transform [1 0 0 1 0 1 0 0 0 0 1 0 0 0 0 1] ›ObjectInstance "a" WorldEnd"#, r#"perspective transformation"#),
         (r#"WorldBegin ObjectBegin "a" Shape "sphere" ObjectEnd Scale 1 2 1 ›ObjectInstance "a" WorldEnd"#, r#"ellipsoid"#),
-        (r#"WorldBegin ObjectBegin "a" ObjectEnd ActiveTransform EndTime Translate 1 0 0 ›ObjectInstance "a" WorldEnd"#, r#"moving instances"#),
+        (r#"WorldBegin ObjectBegin "a" ObjectEnd ActiveTransform EndTime Scale 1 1 -1 ›ObjectInstance "a" WorldEnd"#, r#"one mirrors and the other does not"#),
+        (r#"WorldBegin ActiveTransform EndTime Scale 1 1 -1 ›Shape "sphere" WorldEnd"#, r#"one mirrors and the other does not"#),
+        (r#"WorldBegin ActiveTransform EndTime Translate 1 0 0 ›LightSource "point" WorldEnd"#, r#"moving"#),
+        (r#"›TransformTimes 2 1 WorldBegin WorldEnd"#, r#"do not ascend"#),
+        (r#"ActiveTransform EndTime Scale 0 1 1 ›Camera "perspective" WorldBegin WorldEnd"#, r#"cannot be inverted"#),
     ];
     for (marked, words) in CASES {
         let (before, after) = marked.split_once('›').unwrap();

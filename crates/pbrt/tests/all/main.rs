@@ -22,6 +22,7 @@ mod limits;
 mod materials;
 mod media;
 mod meshes;
+mod motion;
 mod mutated;
 mod shapes;
 mod shared_scenes;

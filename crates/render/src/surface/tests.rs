@@ -257,6 +257,7 @@ fn blocks_hold_the_surfaces_of_single_hits() {
             Quat::from_rotation_y(turn),
             Vec3::new(3.0, -8.0, turn),
         ),
+        end: None,
     };
     let scene = Scene {
         name: String::new(),

@@ -98,6 +98,7 @@ fn an_instance_of_a_cube_is_black_inside() {
         scene.instances.push(Instance {
             object: 0,
             world_from_object: Affine3::from_mat4(matrix),
+            end: None,
         });
         is_black(scene, &format!("instance of {width}"));
     }

@@ -43,6 +43,7 @@ fn what_cannot_be_rendered_is_refused() {
         refused(&|s| s.instances.push(Instance {
             object: 3,
             world_from_object: Affine3::IDENTITY,
+            end: None,
         })),
         Error::Geometry(antumbra::Error::ObjectOutOfRange { object: 3, .. })
     ));

@@ -266,6 +266,7 @@ fn instances_are_their_shapes_written_out() {
         .map(|world_from_object| Instance {
             object: 1,
             world_from_object,
+            end: None,
         })
         .to_vec();
         by_hand.shapes.rotate_left(6);

@@ -70,6 +70,7 @@ fn gallery() -> Scene {
     scene.instances.push(Instance {
         object: 0,
         world_from_object: Affine3::from_rotation_translation(turn, Vec3::new(0.0, -1.0, -0.5)),
+        end: None,
     });
     scene
 }
@@ -232,6 +233,7 @@ fn an_instance_sees_all_of_its_sky_at_every_scale() {
                 scene.instances.push(Instance {
                     object: 0,
                     world_from_object: Affine3::from_mat4(matrix),
+                    end: None,
                 });
                 sees_all_of_its_sky(
                     &mut scene,

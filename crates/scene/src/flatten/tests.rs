@@ -21,6 +21,7 @@ fn scene(shapes: Vec<Shape>, objects: Vec<Vec<Shape>>, places: &[(usize, Affine3
             .map(|&(object, world_from_object)| Instance {
                 object,
                 world_from_object,
+                end: None,
             })
             .collect(),
         materials: Vec::new(),
