@@ -30,6 +30,11 @@ pub enum Error {
         /// Number of positions.
         positions: usize,
     },
+    /// The scene moves, and somebody else is to answer the queries of its rendering, who does not know their times.
+    #[error(
+        "the scene moves while the shutter is open, which this command does not support; `render` does"
+    )]
+    Moves,
     /// A texture's image is empty, has another number of pixels than its sides say, or is too large.
     #[error(
         "texture {name} of {width} x {height} texels has {found} pixels; sides may have 1 to 16777216 texels"

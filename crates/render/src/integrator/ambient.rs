@@ -78,7 +78,8 @@ impl AmbientOcclusion {
         shadows: &mut ShadowQueue,
     ) {
         let rays = &self.current.rays;
-        self.hits.find(tracer, rays);
+        let samples = self.current.samples.iter().copied();
+        self.hits.find(tracer, rays, samples);
         for (index, &sample) in self.current.samples.iter().enumerate() {
             let Some(surface) = self.hits.surface(&world.shapes, rays, index) else {
                 continue;

@@ -170,7 +170,8 @@ impl DirectLighting {
                 follow: depth.saturating_add(1) < self.max_depth,
             };
             while !self.current.rays.is_empty() && !tracer.is_stopped() {
-                self.hits.find(tracer, &self.current.rays);
+                let samples = self.current.samples.iter().copied();
+                self.hits.find(tracer, &self.current.rays, samples);
                 self.through.clear();
                 for index in 0..self.current.rays.len() {
                     if tracer.is_stopped() {
@@ -218,7 +219,7 @@ impl DirectLighting {
         let (bsdf, frame) = match (material, self.hits.hit(index)) {
             (Material::Constant(bsdf), _) => (bsdf, shading_frame(world, bsdf, &surface)),
             (Material::Varying(varying), Some(hit)) => {
-                let neighbours = neighbours(world, batch, &rays[index], step.from_camera);
+                let neighbours = neighbours(world, batch, (&rays[index], sample), step.from_camera);
                 made = varying.shade(&world.shapes, &surface, hit, neighbours.as_ref());
                 (&made.0, made.1)
             }

@@ -33,9 +33,9 @@ impl Default for Hits {
 }
 
 impl Hits {
-    /// Traces `rays`. Earlier hits are forgotten.
-    pub fn find(&mut self, tracer: &mut Tracer, rays: &[Ray]) {
-        tracer.intersect(rays, &mut self.hits);
+    /// Traces `rays`, which belong to `samples` of the batch. Earlier hits are forgotten.
+    pub fn find(&mut self, tracer: &mut Tracer, rays: &[Ray], samples: impl Iterator<Item = u32>) {
+        tracer.intersect(rays, samples, &mut self.hits);
         self.isa = tracer.isa();
         self.block = None;
     }

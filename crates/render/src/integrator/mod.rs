@@ -44,6 +44,8 @@ pub mod dimension {
     pub const FILM: u32 = 0;
     /// Position on the lens.
     pub const LENS: u32 = 1;
+    /// Time.
+    pub const TIME: u32 = u32::MAX;
     /// First dimension of the integrator.
     pub const FIRST: u32 = 2;
 }
@@ -55,6 +57,8 @@ pub struct Batch {
     pub rays: Vec<Ray>,
     /// Random values of every sample.
     pub streams: Vec<Stream>,
+    /// Time of every sample, from 0 to 1. Empty where nothing moves.
+    pub times: Vec<f32>,
     /// Distance to the next sample in pixels, over which textures are averaged. 0 to average nothing.
     pub step: f32,
     /// Position of every sample inside its pixel. Integrators ignore it.
@@ -100,6 +104,13 @@ impl Batch {
         self.rays.clear();
         self.streams.clear();
         self.inside.clear();
+        self.times.clear();
+    }
+
+    /// The camera of the world at the time of a sample, if the camera moves.
+    pub fn camera(&self, world: &World, sample: u32) -> Option<Camera> {
+        let time = self.times.get(sample as usize)?;
+        world.camera.at(*time)
     }
 
     /// Adds the camera ray of a sample.
@@ -113,7 +124,16 @@ impl Batch {
             [0.0; 2]
         };
         let film = [x as f32 + dx, y as f32 + dy];
-        self.rays.push(camera.ray(film, lens));
+        let ray = match camera.has_time() {
+            false => camera.ray(film, lens),
+            true => {
+                let time = camera.time(stream.uniform(dimension::TIME));
+                self.times.push(time);
+                let moved = camera.at(time);
+                moved.as_ref().unwrap_or(camera).ray(film, lens)
+            }
+        };
+        self.rays.push(ray);
         self.streams.push(stream);
         self.inside.push([dx, dy]);
     }
@@ -211,6 +231,7 @@ impl Integrator {
     /// Computes the radiance of every ray of the batch. With `costs`, also the cost of its shadow rays.
     pub fn trace(&mut self, world: &World, tracer: &mut Tracer, batch: &mut Batch, costs: bool) {
         batch.begin(costs);
+        tracer.begin(&batch.times);
         let shadows = &mut self.shadows;
         match &mut self.method {
             Method::Path(path) => path.trace(world, tracer, batch, shadows),

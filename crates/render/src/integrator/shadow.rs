@@ -50,7 +50,8 @@ impl ShadowQueue {
     }
 
     fn trace(&mut self, tracer: &mut Tracer, sums: &mut [Vec3], sample_costs: &mut [SampleCost]) {
-        let (occluded, costs) = tracer.occluded(&self.rays);
+        let samples = self.gains.iter().map(|&(sample, _)| sample);
+        let (occluded, costs) = tracer.occluded(&self.rays, samples);
         for (&(sample, light), &occluded) in self.gains.iter().zip(occluded) {
             if !occluded {
                 sums[sample as usize] += light;

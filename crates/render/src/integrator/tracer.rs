@@ -3,11 +3,16 @@
 use std::time::{Duration, Instant};
 
 use antumbra::lab::{Cost, Laboratory};
-use antumbra::{Bvh, Hit, Isa, Ray};
+use antumbra::{Bvh, Hit, Isa, MovingBvh, Ray};
 use serde::{Deserialize, Serialize};
 
 use super::queries::Queries;
+use crate::surface::Times;
 use crate::training::TrainingSample;
+use crate::world::World;
+
+/// Rays that a moving tree answers at a time, on this thread.
+const CHUNK: usize = 1 << 14;
 
 /// Record to keep of the rays besides their answers.
 pub enum Observe<'b> {
@@ -64,6 +69,13 @@ pub struct Tracer<'b> {
     occluded: Vec<bool>,
     costs: Vec<Cost>,
     stop: Option<&'b dyn Fn() -> bool>,
+    /// The tree that moves, if there is one, and the times that its rays can have. It answers, and `bvh` only counts and
+    /// learns, where everything is half way.
+    moving: Option<(&'b MovingBvh, Times)>,
+    /// Times of the samples of the batch.
+    sample_times: Vec<f32>,
+    /// Times of the rays under way.
+    times: Vec<f32>,
 }
 
 impl<'b> Tracer<'b> {
@@ -76,6 +88,23 @@ impl<'b> Tracer<'b> {
             occluded: Vec::new(),
             costs: Vec::new(),
             stop: None,
+            moving: None,
+            sample_times: Vec::new(),
+            times: Vec::new(),
+        }
+    }
+
+    /// Has a tree of this world that moves answer, if there is one.
+    pub fn moving(mut self, world: &World, moving: Option<&'b MovingBvh>) -> Self {
+        self.moving = moving.zip(world.shapes.times());
+        self
+    }
+
+    /// Begins a batch of samples at these times.
+    pub fn begin(&mut self, times: &[f32]) {
+        if let Some((_, of_world)) = self.moving {
+            self.sample_times.clear();
+            (self.sample_times).extend(times.iter().map(|time| of_world.nearest(*time)));
         }
     }
 
@@ -99,12 +128,30 @@ impl<'b> Tracer<'b> {
         self.bvh.isa()
     }
 
-    /// Closest hits of `rays`, written over `hits`.
-    pub fn intersect(&mut self, rays: &[Ray], hits: &mut Vec<Option<Hit>>) {
+    /// Closest hits of `rays`, which belong to `samples` of the batch, written over `hits`. Ids of instances have the
+    /// [time](Times) where something moves.
+    pub fn intersect(
+        &mut self,
+        rays: &[Ray],
+        samples: impl Iterator<Item = u32>,
+        hits: &mut Vec<Option<Hit>>,
+    ) {
         let start = Instant::now();
         hits.clear();
         hits.resize(rays.len(), None);
-        if let Observe::Each(queries) = &mut self.observe {
+        if let Some((moving, of_world)) = self.moving {
+            self.times.clear();
+            (self.times).extend(samples.map(|sample| self.sample_times[sample as usize]));
+            let chunks = rays.chunks(CHUNK).zip(self.times.chunks(CHUNK));
+            for ((rays, times), hits) in chunks.zip(hits.chunks_mut(CHUNK)) {
+                moving.intersect_batch(rays, times, hits);
+                for (hit, time) in hits.iter_mut().zip(times) {
+                    if let Some(hit) = hit {
+                        hit.inst_id = of_world.join(hit.inst_id, *time);
+                    }
+                }
+            }
+        } else if let Observe::Each(queries) = &mut self.observe {
             queries.intersect(self.bvh, rays, hits);
         } else {
             self.bvh.batch(rays).on_this_thread().intersect_into(hits);
@@ -113,8 +160,13 @@ impl<'b> Tracer<'b> {
         self.counts.closest += start.elapsed();
     }
 
-    /// Whether each of `rays` is occluded, and its cost. No costs unless they are observed.
-    pub fn occluded(&mut self, rays: &[Ray]) -> (&[bool], &[Cost]) {
+    /// Whether each of `rays`, which belong to `samples` of the batch, is occluded, and its cost. No costs unless they are observed;
+    /// where something moves, they are costs of the tree half way.
+    pub fn occluded(
+        &mut self,
+        rays: &[Ray],
+        samples: impl Iterator<Item = u32>,
+    ) -> (&[bool], &[Cost]) {
         let start = Instant::now();
         self.occluded.clear();
         self.occluded.resize(rays.len(), false);
@@ -129,6 +181,7 @@ impl<'b> Tracer<'b> {
         }
         let (occluded, costs) = (&mut self.occluded[..], &mut self.costs[..]);
         match &mut self.observe {
+            Observe::Nothing if self.moving.is_some() => {}
             Observe::Nothing => self
                 .bvh
                 .batch(rays)
@@ -139,6 +192,14 @@ impl<'b> Tracer<'b> {
                 sample.occluded(self.bvh, rays, occluded, costs);
             }
             Observe::Each(queries) => queries.occluded(self.bvh, rays, occluded),
+        }
+        if let Some((moving, _)) = self.moving {
+            self.times.clear();
+            (self.times).extend(samples.map(|sample| self.sample_times[sample as usize]));
+            let chunks = rays.chunks(CHUNK).zip(self.times.chunks(CHUNK));
+            for ((rays, times), occluded) in chunks.zip(occluded.chunks_mut(CHUNK)) {
+                moving.occluded_batch(rays, times, occluded);
+            }
         }
         self.counts.shadow_rays += rays.len() as u64;
         self.counts.occluded_rays += occluded.iter().filter(|&&o| o).count() as u64;

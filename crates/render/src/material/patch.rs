@@ -40,6 +40,7 @@ impl Patch {
         neighbours: Option<&[Ray; 2]>,
     ) -> Self {
         let placement = shapes.placement(hit);
+        let placement = placement.as_deref();
         let mut patch = match &shapes[surface.shape].geometry {
             Geometry::Mesh(mesh) => Self::of_triangle(mesh, placement, surface, hit),
             Geometry::Sphere(sphere) => Self::of_sphere(sphere, placement, surface),

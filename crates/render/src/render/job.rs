@@ -2,6 +2,8 @@
 
 use std::time::Instant;
 
+use antumbra::{Bvh, MovingBvh};
+
 use super::Task;
 use super::learn::Learned;
 use super::monitor::Monitor;
@@ -128,6 +130,17 @@ impl<'a> Job<'a> {
         // The mean distance of so many samples in a pixel, as in pbrt-v3.
         let count = self.texture_spp.unwrap_or(self.spp).max(1);
         batch.step = 1.0 / (count as f32).sqrt();
+    }
+
+    /// The tree of the world with its motion; `None` where no instance moves.
+    ///
+    /// # Errors
+    /// [`Error::Moves`] if somebody else is to answer the queries, who does not know their times.
+    pub fn moving(&self, bvh: &Bvh, is_observed: bool) -> Result<Option<MovingBvh>, Error> {
+        if is_observed && self.world.moves() {
+            return Err(Error::Moves);
+        }
+        self.world.moving(bvh)
     }
 
     /// Position of a sample inside its pixel.

@@ -67,11 +67,12 @@ impl Layers {
         let [x0, x1, y0, y1] = world.film.pixel_bounds().map(|bound| bound as i32);
         let window = Window { x0, y0, x1, y1 };
         let bvh = world.bvh(Width::auto(isa.level()), isa);
+        let moving = world.moving(&bvh)?;
         let sampler = Sampler::new(Method::of(world.sampler.kind, spp), seed);
         let rows: Vec<Vec<Pixel>> = (y0..y1)
             .into_par_iter()
             .map(|y| {
-                let mut tracer = Tracer::new(&bvh, Observe::Nothing);
+                let mut tracer = Tracer::new(&bvh, Observe::Nothing).moving(world, moving.as_ref());
                 let mut hits = Vec::new();
                 let mut batch = Batch::default();
                 let pixel = |x: i32| {
@@ -80,9 +81,10 @@ impl Layers {
                         let pixel = [x, y];
                         batch.push(&world.camera, &sampler, Sample { pixel, index });
                     }
-                    tracer.intersect(&batch.rays, &mut hits);
+                    tracer.begin(&batch.times);
+                    tracer.intersect(&batch.rays, 0..samples, &mut hits);
                     let step = 1.0 / (texture_spp.unwrap_or(spp).max(1) as f32).sqrt();
-                    mean(world, &batch.rays, &hits, step)
+                    mean(world, &batch, &hits, step)
                 };
                 (x0..x1).map(pixel).collect()
             })
@@ -107,15 +109,17 @@ impl Layers {
 }
 
 /// Mean over the samples of a pixel.
-fn mean(world: &World, rays: &[antumbra::Ray], hits: &[Option<antumbra::Hit>], step: f32) -> Pixel {
+fn mean(world: &World, batch: &Batch, hits: &[Option<antumbra::Hit>], step: f32) -> Pixel {
     let mut sum = Pixel::default();
     let mut found = 0.0;
-    for (ray, hit) in rays.iter().zip(hits) {
+    for ((ray, hit), sample) in batch.rays.iter().zip(hits).zip(0..) {
         let Some(hit) = hit else {
             continue;
         };
         let surface = Surface::found(&world.shapes, ray, hit);
-        let neighbours = world.camera.neighbours(ray, step);
+        let moved = batch.camera(world, sample);
+        let camera = moved.as_ref().unwrap_or(&world.camera);
+        let neighbours = camera.neighbours(ray, step);
         let constant;
         let (bsdf, frame) = match world.material(surface.shape) {
             Material::None => {
@@ -146,9 +150,9 @@ fn mean(world: &World, rays: &[antumbra::Ray], hits: &[Option<antumbra::Hit>], s
         sum.normal += facing(surface.normal);
         sum.shading_normal += facing(frame.to_world(Vec3::Z));
         sum.position += surface.point;
-        sum.depth += world.camera.depth(surface.point);
+        sum.depth += camera.depth(surface.point);
     }
-    let count = rays.len() as f32;
+    let count = batch.rays.len() as f32;
     if found == 0.0 {
         return Pixel::default();
     }

@@ -39,6 +39,7 @@ pub fn run(
     {
         publish_earlier(live, job, &done)?;
     }
+    let moving = job.moving(bvh, observer.is_some())?;
     let accumulator = TileAccumulator::new(done, rayon::current_num_threads());
     let jobs = Jobs::after(before, job.todo.len(), Phase::Render, job.monitor);
     let outcome = jobs.run(|jobs| {
@@ -56,7 +57,7 @@ pub fn run(
             live,
             costs: options.cost_map,
             thread: rayon::current_thread_index().unwrap_or(0),
-            tracer: Tracer::new(bvh, observe).until(&stop),
+            tracer: (Tracer::new(bvh, observe).until(&stop)).moving(job.world, moving.as_ref()),
             integrator: Integrator::new(job.world),
             samples: Vec::new(),
             pixels: Vec::new(),

@@ -60,6 +60,7 @@ pub fn run(
     // Large jobs make full batches, which may span tiles. Every thread needs some jobs, though.
     let group = group.min(tiles.div_ceil(4 * rayon::current_num_threads()).max(1));
     let radiance = Mutex::new(std::mem::take(&mut prepass.radiance));
+    let moving = job.moving(bvh, observer.is_some())?;
     let jobs = Jobs::new(tiles.div_ceil(group), Phase::Log, job.monitor);
     let workers = jobs.run(|jobs| {
         let start = Instant::now();
@@ -70,6 +71,7 @@ pub fn run(
             None => Observe::Learn(Box::new(empty.clone())),
         };
         let mut tracer = Tracer::new(bvh, observe).until(&stop);
+        tracer = tracer.moving(job.world, moving.as_ref());
         let mut integrator = Integrator::new(job.world);
         let mut pending = Pending::default();
         while let Some(index) = jobs.take() {

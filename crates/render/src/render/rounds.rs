@@ -124,6 +124,7 @@ fn rounds(
     while round.samples < job.spp {
         let depth = round.samples.clamp(1, DEEPEST).min(job.spp - round.samples);
         let tree = tree();
+        let moving = job.moving(&tree.bvh, false)?;
         let quiet = Quiet(job.monitor);
         let jobs = Jobs::new(groups.len(), Phase::Render, &quiet);
         let found = jobs.run(|jobs| {
@@ -136,7 +137,8 @@ fn rounds(
                 job,
                 live,
                 costs: options.cost_map,
-                tracer: Tracer::new(&tree.bvh, observe).until(&stop),
+                tracer: (Tracer::new(&tree.bvh, observe).until(&stop))
+                    .moving(job.world, moving.as_ref()),
                 integrator: Integrator::new(job.world),
                 samples: Vec::new(),
                 batch: Batch::default(),

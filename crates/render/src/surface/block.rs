@@ -3,7 +3,7 @@
 //! Vertices miss the cache. They are prefetched for the whole block, so that the misses of different hits overlap.
 //! The rest is computed in vectors. Every lane has the bits of [`Surface::at`].
 
-use antumbra::{Hit, Isa, Ray};
+use antumbra::{Hit, INVALID_ID, Isa, Ray};
 use antumbra_scene::{Geometry, TriangleMesh};
 use antumbra_simd::{Dispatch, Simd, Width, WithSimd};
 use glam::Vec3;
@@ -165,7 +165,7 @@ impl SurfaceBlock {
             found.side.set(lane, Vec3::new(geometric, shading, 0.0));
             found.uvt.set(lane, Vec3::new(hit.u, hit.v, hit.t));
             found.dir.set(lane, Vec3::from(rays[place as usize].dir));
-            special |= shapes.placement(hit).is_some();
+            special |= hit.inst_id != INVALID_ID;
         }
         isa.dispatch(FetchVertices(&mut triangles));
         triangles.copy(found);
@@ -219,6 +219,7 @@ impl SurfaceBlock {
     fn place(&mut self, lane: usize, shapes: &Shapes, ray: &Ray, hit: &Hit) {
         let columns = &mut self.surfaces;
         let placement = shapes.placement(hit);
+        let placement = placement.as_deref();
         let shape = &shapes[self.hit[lane].shape as usize];
         if let Geometry::Sphere(sphere) = &shape.geometry {
             let (point, error, normal) = on_sphere(shape, sphere, placement, ray, hit);
@@ -250,6 +251,7 @@ impl SurfaceBlock {
         let weights = [1.0 - u - v, u, v];
         let wanted = EDGE_ERRORS * error.max_element();
         let placement = shapes.placement(hit);
+        let placement = placement.as_deref();
         let (start, edge) = start_inside(corners, weights, edge, wanted / scale, placement);
         let normal = columns.normal.get(lane);
         let room = Room {
@@ -315,7 +317,7 @@ impl WithSimd<16> for FetchIndices<'_> {
             {
                 simd.prefetch(indices);
             }
-            if let Some(placement) = self.shapes.placement(hit) {
+            if let Some(placement) = self.shapes.stored_placement(hit) {
                 simd.prefetch(placement);
             }
         }

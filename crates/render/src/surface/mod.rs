@@ -18,7 +18,7 @@ pub use block::{SurfaceBlock, Surfaces};
 pub use frame::{Frame, reflect, refract, same_hemisphere};
 pub use origin_offset::{Room, SEGMENT_SHARE, offset, offset_distance, segment};
 pub use point::Surface;
-pub use shapes::{Placement, Shapes};
+pub use shapes::{Placement, Shapes, Times, affine};
 pub use triangle::{
     DEFAULT_UV, Plane, Vertices, corners, interpolate, triangle_normals, vertex_color,
 };

@@ -46,6 +46,7 @@ impl Surface {
         let index = shapes.index_of(hit);
         let shape = &shapes[index];
         let placement = shapes.placement(hit);
+        let placement = placement.as_deref();
         let dir = Vec3::from(ray.dir);
         let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
         // In the space of the object, if there is one.
@@ -172,6 +173,7 @@ impl Surface {
     /// keep no rotation of their own, u turns around the z axis of the world or of the object.
     pub fn tangent(&self, shapes: &Shapes) -> Vec3 {
         let placement = shapes.placement_of(self.inst_id);
+        let placement = placement.as_deref();
         let tangent = match &shapes[self.shape].geometry {
             Geometry::Mesh(mesh) => {
                 let [p0, p1, p2] = corners(mesh, self.primitive);

@@ -1,12 +1,14 @@
 //! Shapes of the world and of its objects, found by a hit of the kernel.
 
+use std::borrow::Cow;
 use std::ops::Index;
 
-use antumbra::{Aabb, Hit, INVALID_ID};
+use antumbra::{Aabb, Hit, INVALID_ID, MovingInstance};
 use antumbra_scene::{Scene, Shape};
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
 use super::triangle::gamma;
+use crate::world::moving_instance;
 
 /// All shapes of a scene: first the shapes of the world, then the shapes of every object in turn.
 ///
@@ -17,6 +19,7 @@ pub struct Shapes {
     /// Place of the first shape of the object of each instance. Apart from the placements, which miss the cache.
     first_of_instance: Vec<u32>,
     placements: Vec<Placement>,
+    motion: Option<Motion>,
     /// Origin offset of rays, see [`Aabb::origin_offset`].
     pub origin_offset: f32,
 }
@@ -40,6 +43,7 @@ impl Shapes {
             shapes,
             first_of_instance: first_of_instance.collect(),
             placements: placements.collect(),
+            motion: Motion::new(scene),
             origin_offset: bounds.origin_offset(),
         }
     }
@@ -51,6 +55,7 @@ impl Shapes {
             shapes: shapes.to_vec(),
             first_of_instance: Vec::new(),
             placements: Vec::new(),
+            motion: None,
             origin_offset: 0.0,
         }
     }
@@ -60,21 +65,52 @@ impl Shapes {
     pub fn index_of(&self, hit: &Hit) -> usize {
         let first = match hit.inst_id {
             INVALID_ID => 0,
-            instance => self.first_of_instance[instance as usize],
+            instance => self.first_of_instance[self.instance(instance).0],
         };
         first as usize + hit.geom_id as usize
     }
 
     /// Placement of the instance that was hit. `None` for a shape of the world.
     #[inline]
-    pub fn placement(&self, hit: &Hit) -> Option<&Placement> {
+    pub fn placement(&self, hit: &Hit) -> Option<Cow<'_, Placement>> {
         self.placement_of(hit.inst_id)
     }
 
-    /// Placement of an instance by its id.
+    /// Placement of an instance by its id, which has the time where something moves.
     #[inline]
-    pub fn placement_of(&self, inst_id: u32) -> Option<&Placement> {
-        (inst_id != INVALID_ID).then(|| &self.placements[inst_id as usize])
+    pub fn placement_of(&self, inst_id: u32) -> Option<Cow<'_, Placement>> {
+        if inst_id == INVALID_ID {
+            return None;
+        }
+        let (instance, time) = self.instance(inst_id);
+        let moving = self
+            .motion
+            .as_ref()
+            .and_then(|motion| motion.instances[instance].as_ref());
+        Some(match moving {
+            None => Cow::Borrowed(&self.placements[instance]),
+            Some(moving) => Cow::Owned(Placement::new(at(moving, time))),
+        })
+    }
+
+    /// Stored placement of the instance that was hit, to be prefetched.
+    #[inline]
+    pub fn stored_placement(&self, hit: &Hit) -> Option<&Placement> {
+        (hit.inst_id != INVALID_ID).then(|| &self.placements[self.instance(hit.inst_id).0])
+    }
+
+    /// Index of an instance and the time, of an id.
+    #[inline(always)]
+    fn instance(&self, inst_id: u32) -> (usize, f32) {
+        match &self.motion {
+            None => (inst_id as usize, 0.0),
+            Some(motion) => motion.times.split(inst_id),
+        }
+    }
+
+    /// Times that ids can have. `None` where no instance moves.
+    pub fn times(&self) -> Option<Times> {
+        self.motion.as_ref().map(|motion| motion.times)
     }
 }
 
@@ -84,6 +120,94 @@ impl Index<usize> for Shapes {
     #[inline]
     fn index(&self, index: usize) -> &Shape {
         &self.shapes[index]
+    }
+}
+
+/// Times of a scene that moves, and ids that carry them: a surface needs to know when it was hit, and its id goes wherever it does.
+/// The number of the instance is in the lower bits of an id, and the time in the others, so times are multiples of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Times {
+    /// Bits of the number of an instance.
+    bits: u32,
+}
+
+impl Times {
+    /// Most bits of a time.
+    const MOST: u32 = 20;
+
+    /// Times for so many instances, none of which is all ones, as [`INVALID_ID`] is.
+    fn new(instances: usize) -> Self {
+        let bits = usize::BITS - instances.leading_zeros();
+        Self {
+            bits: bits.max(32 - Self::MOST),
+        }
+    }
+
+    fn steps(self) -> u32 {
+        1 << (32 - self.bits)
+    }
+
+    /// The time nearest to one in [0, 1] that an id can have.
+    #[inline]
+    pub fn nearest(self, time: f32) -> f32 {
+        let last = (self.steps() - 1) as f32;
+        (time.clamp(0.0, 1.0) * last).round() / last
+    }
+
+    /// The id of an instance at a time that ids can have.
+    #[inline]
+    pub fn join(self, inst_id: u32, time: f32) -> u32 {
+        let last = (self.steps() - 1) as f32;
+        if inst_id == INVALID_ID {
+            return inst_id;
+        }
+        inst_id | ((time * last).round() as u32) << self.bits
+    }
+
+    /// Number of an instance, and the time, of an id.
+    #[inline]
+    fn split(self, id: u32) -> (usize, f32) {
+        let last = (self.steps() - 1) as f32;
+        let instance = id & ((1 << self.bits) - 1);
+        (instance as usize, (id >> self.bits) as f32 / last)
+    }
+}
+
+/// Instances that move.
+#[derive(Debug)]
+struct Motion {
+    times: Times,
+    /// `None` for those that do not.
+    instances: Vec<Option<MovingInstance>>,
+}
+
+impl Motion {
+    /// `None` if no instance moves.
+    fn new(scene: &Scene) -> Option<Self> {
+        let moving = |instance: &antumbra_scene::Instance| {
+            instance.end.is_some().then(|| moving_instance(instance))
+        };
+        let instances: Vec<_> = scene.instances.iter().map(moving).collect();
+        (instances.iter().any(Option::is_some)).then(|| Self {
+            times: Times::new(instances.len()),
+            instances,
+        })
+    }
+}
+
+/// The transform of a moving instance at a time, as the kernel has it.
+fn at(instance: &MovingInstance, time: f32) -> Affine3A {
+    // Keys were checked when the scene was lowered.
+    let rows = instance.transform_at(time).unwrap_or(instance.keys[0]);
+    affine(&rows)
+}
+
+/// An affine map of its rows.
+pub fn affine(rows: &[[f32; 4]; 3]) -> Affine3A {
+    let column = |column: usize| Vec3A::from(rows.map(|row| row[column]));
+    Affine3A {
+        matrix3: Mat3A::from_cols(column(0), column(1), column(2)),
+        translation: column(3),
     }
 }
 

@@ -2,13 +2,15 @@
 
 use std::f32::consts::{PI, TAU};
 
-use antumbra::Ray;
+use antumbra::{MovingInstance, Ray};
 use antumbra_scene::{Film, Projection};
-use glam::{Affine3A, Mat4, Vec3};
+use glam::{Affine3, Affine3A, Mat4, Vec3, Vec4};
 
 use crate::Error;
 use crate::light::{longitude_latitude, octahedron};
 use crate::sampler::warp::disk;
+use crate::surface::affine;
+use crate::world::rows;
 
 /// A camera, ready to make rays.
 #[derive(Clone, Debug)]
@@ -27,6 +29,12 @@ pub struct Camera {
     lens_radius: f32,
     focal_distance: f32,
     medium: Option<u32>,
+    /// Keys of the camera, if it moves: from its space to the world.
+    path: Option<MovingInstance>,
+    /// Times at which the shutter opens and closes.
+    shutter: [f32; 2],
+    /// Whether paths have a time, as something moves.
+    has_time: bool,
 }
 
 impl Camera {
@@ -73,6 +81,45 @@ impl Camera {
             },
             focal_distance: camera.focal_distance,
             medium: camera.medium,
+            path: path(camera)?,
+            shutter: camera.shutter,
+            has_time: camera.end.is_some(),
+        })
+    }
+
+    /// Whether the camera moves while the shutter is open.
+    pub fn moves(&self) -> bool {
+        self.path.is_some()
+    }
+
+    /// Gives paths a time also if the camera does not move.
+    pub(super) fn with_time(self, has_time: bool) -> Self {
+        let has_time = self.has_time || has_time;
+        Self { has_time, ..self }
+    }
+
+    /// Whether paths have a time.
+    #[inline]
+    pub fn has_time(&self) -> bool {
+        self.has_time
+    }
+
+    /// The time of a path, from 0 to 1, of a uniform random number.
+    pub fn time(&self, uniform: f32) -> f32 {
+        let [open, close] = self.shutter;
+        (open + uniform * (close - open)).clamp(0.0, 1.0)
+    }
+
+    /// The camera at a time. `None` for one that does not move.
+    pub fn at(&self, time: f32) -> Option<Self> {
+        let rows = self.path.as_ref()?.transform_at(time).ok()?;
+        let matrix = Mat4::from(affine(&rows));
+        Some(Self {
+            world_from_camera: matrix,
+            camera_from_world: matrix.inverse(),
+            eye: matrix.project_point3(Vec3::ZERO),
+            path: None,
+            ..*self
         })
     }
 
@@ -187,6 +234,23 @@ impl Camera {
             tfar: f32::INFINITY,
         }
     }
+}
+
+/// Keys of a camera that moves.
+fn path(camera: &antumbra_scene::Camera) -> Result<Option<MovingInstance>, Error> {
+    let Some(end) = camera.end else {
+        return Ok(None);
+    };
+    let matrices = [camera.world_from_camera, end];
+    let keys = matrices.map(|matrix| rows(&Affine3::from_mat4(matrix)));
+    let path = MovingInstance::new(0, keys.to_vec());
+    let is_sound = path.transform_at(0.5).is_ok() && camera.shutter.iter().all(|t| t.is_finite());
+    // Both mirror or none does, and neither flattens space.
+    if !is_sound || matrices.iter().any(|matrix| matrix.row(3) != Vec4::W) {
+        let determinant = Affine3A::from_mat4(end).matrix3.determinant();
+        return Err(Error::CameraMatrix { determinant });
+    }
+    Ok(Some(path))
 }
 
 #[cfg(test)]

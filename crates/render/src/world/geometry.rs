@@ -3,8 +3,9 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use antumbra::{Primitives, Sphere};
+use antumbra::{MovingGeometry, MovingInstance, MovingScene, Primitives, Sphere};
 use antumbra_scene::{Geometry, Instance, Scene, Shape};
+use glam::Affine3;
 
 use crate::texture::Cutouts;
 use crate::texture::Textures;
@@ -16,8 +17,10 @@ pub struct Lowered<'s> {
     pub world: Vec<antumbra::Geometry<'s>>,
     /// The shapes of every object.
     pub objects: Vec<Vec<antumbra::Geometry<'s>>>,
-    /// Placed objects.
+    /// Placed objects, where they are at time 0.
     pub instances: Vec<antumbra::Instance>,
+    /// The same with the keys of those that move. Empty where nothing moves.
+    pub(crate) moving: Vec<MovingInstance>,
 }
 
 impl<'s> Lowered<'s> {
@@ -34,7 +37,28 @@ impl<'s> Lowered<'s> {
             world: of_shapes(&scene.shapes),
             objects: objects.map(|object| of_shapes(&object.shapes)).collect(),
             instances: scene.instances.iter().map(of_instance).collect(),
+            moving: match scene.instances.iter().any(|one| one.end.is_some()) {
+                true => scene.instances.iter().map(moving_instance).collect(),
+                false => Vec::new(),
+            },
         }
+    }
+
+    /// The scene as the kernel traces it at any time; `None` where nothing moves.
+    ///
+    /// # Errors
+    /// As [`MovingScene::new`].
+    pub(crate) fn moving(&self) -> Result<Option<MovingScene<'s>>, antumbra::Error> {
+        if self.moving.is_empty() {
+            return Ok(None);
+        }
+        let world = self
+            .world
+            .iter()
+            .cloned()
+            .map(MovingGeometry::from)
+            .collect();
+        MovingScene::new(world, self.objects.clone(), self.moving.clone()).map(Some)
     }
 
     /// Primitives of the kernel, checked.
@@ -71,14 +95,27 @@ fn of_shape<'s>(shape: &'s Shape, textures: &mut Textures) -> antumbra::Geometry
 
 /// An instance. The kernel refuses instances of missing objects.
 fn of_instance(instance: &Instance) -> antumbra::Instance {
-    let matrix = instance.world_from_object;
+    antumbra::Instance::new(object(instance), rows(&instance.world_from_object))
+}
+
+/// An instance with its keys.
+pub fn moving_instance(instance: &Instance) -> MovingInstance {
+    let keys = [Some(instance.world_from_object), instance.end];
+    let keys = keys.iter().flatten().map(rows).collect();
+    MovingInstance::new(object(instance), keys)
+}
+
+/// Numbers beyond 32 bits are beyond the number of objects, too.
+fn object(instance: &Instance) -> u32 {
+    u32::try_from(instance.object).unwrap_or(u32::MAX)
+}
+
+/// Rows of an affine map.
+pub fn rows(matrix: &Affine3) -> [[f32; 4]; 3] {
     let rows = matrix.matrix3.transpose().to_cols_array_2d();
     let translation = matrix.translation.to_array();
-    // Numbers beyond 32 bits are beyond the number of objects, too.
-    let object = u32::try_from(instance.object).unwrap_or(u32::MAX);
-    let transform = std::array::from_fn(|axis| {
+    std::array::from_fn(|axis| {
         let [x, y, z] = rows[axis];
         [x, y, z, translation[axis]]
-    });
-    antumbra::Instance::new(object, transform)
+    })
 }

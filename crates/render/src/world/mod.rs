@@ -14,7 +14,9 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use antumbra::recipe::{Builder, Collapse};
-use antumbra::{Build, BuildMonitor, Bvh, Isa, Primitives, Recipe, Stage, Width};
+use antumbra::{
+    Build, BuildMonitor, Bvh, Isa, Motion, MovingBvh, Primitives, Recipe, Stage, Width,
+};
 use antumbra_scene::Scene;
 
 use crate::Error;
@@ -27,6 +29,7 @@ use crate::texture::Textures;
 pub use camera::Camera;
 use check::{check, check_film};
 pub use geometry::Lowered;
+pub(crate) use geometry::{moving_instance, rows};
 
 /// A scene ready to be rendered: kernel geometry with a binary tree, lights, materials, camera.
 ///
@@ -53,7 +56,9 @@ pub struct Contents {
     pub(crate) ends_by_occlusion: bool,
     pub(crate) sampler: antumbra_scene::Sampler,
     pub(crate) integrator: antumbra_scene::Integrator,
+    /// Where something moves, primitives half way.
     pub(crate) primitives: Arc<Primitives>,
+    motion: Option<Motion>,
     builder: Builder,
     /// Trees by place in [`Builder::ALL`], built on first use.
     stages: [OnceLock<Stage>; Builder::ALL.len()],
@@ -96,11 +101,24 @@ impl World {
         check(scene)?;
         let mut textures = Textures::default();
         let lowered = Lowered::with(scene, &mut textures);
-        let primitives = lowered.primitives().map_err(Error::Geometry)?;
-        let bounds = primitives.bounds();
+        let moving = lowered.moving().map_err(Error::Geometry)?;
+        let (primitives, bounds, motion) = match moving {
+            None => {
+                let primitives = lowered.primitives().map_err(Error::Geometry)?;
+                let bounds = primitives.bounds();
+                (primitives, bounds, None)
+            }
+            // Trees are built where things are half way.
+            Some(scene) => {
+                let primitives = scene.middle(0).map_err(Error::Geometry)?;
+                let motion = Motion::new(&scene).map_err(Error::Geometry)?;
+                let bounds = motion.bounds().union(&primitives.bounds());
+                (primitives, bounds, Some(motion))
+            }
+        };
         let lights = Lights::new(scene, &bounds, &mut textures);
         let emitters = EmitterTree::new(&lowered.world, |shape| lights.emitter(shape).is_some())?;
-        let camera = Camera::new(&scene.camera, &scene.film)?;
+        let camera = Camera::new(&scene.camera, &scene.film)?.with_time(motion.is_some());
         let materials = scene.materials.iter();
         let materials: Vec<Material> = materials
             .map(|material| Material::new(material, &mut textures))
@@ -126,6 +144,7 @@ impl World {
             sampler: scene.sampler,
             integrator: scene.integrator,
             primitives: Arc::new(primitives),
+            motion,
             builder,
             stages: Default::default(),
             triangles: scene.triangle_count(),
@@ -156,7 +175,7 @@ impl World {
         }
         Ok(Self {
             contents: Arc::clone(&self.contents),
-            camera: Camera::new(camera, film)?,
+            camera: Camera::new(camera, film)?.with_time(self.motion.is_some()),
             film: film.clone(),
         })
     }
@@ -168,7 +187,24 @@ impl World {
         bvh.expect("nobody stops it")
     }
 
-    /// Geometry of the kernel, for trees of one's own.
+    /// A tree of the world, built over [`World::primitives`], with the motion of instances; `None` where none moves.
+    ///
+    /// # Errors
+    /// [`Error::Geometry`].
+    pub(crate) fn moving(&self, bvh: &Bvh) -> Result<Option<MovingBvh>, Error> {
+        let Some(motion) = &self.motion else {
+            return Ok(None);
+        };
+        let moving = MovingBvh::from_trees(motion, vec![bvh.clone()]);
+        moving.map(Some).map_err(Error::Geometry)
+    }
+
+    /// Whether the camera or an instance moves while the shutter is open.
+    pub fn moves(&self) -> bool {
+        self.motion.is_some() || self.camera.moves()
+    }
+
+    /// Geometry of the kernel, for trees of one's own. Instances that move are half way.
     pub fn primitives(&self) -> &Arc<Primitives> {
         &self.primitives
     }

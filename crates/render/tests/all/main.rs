@@ -4,6 +4,7 @@
 //! - `closed`: closed dark bodies are black inside
 //! - `media`: participating media
 //! - `hair`: fibres
+//! - `motion`: what moves while the shutter is open
 //! - `references`: pictures of the shared scenes against pbrt-v3, where they are present
 //! - `samplers`: every sampler has the same mean
 //! - `same_bits`: choices that change no bit, and choices that do
@@ -23,6 +24,7 @@ mod hair;
 mod live;
 mod materials;
 mod media;
+mod motion;
 mod references;
 mod refused;
 mod resume;

@@ -164,7 +164,8 @@ impl PathTracer {
             self.next.clear();
             let mut from_camera = depth == 0;
             while !self.current.rays.is_empty() && !tracer.is_stopped() {
-                self.hits.find(tracer, &self.current.rays);
+                let samples = self.current.states.iter().map(|state| state.sample);
+                self.hits.find(tracer, &self.current.rays, samples);
                 self.through.clear();
                 self.escape(world, batch);
                 for first in (0..self.met.len()).step_by(BLOCK) {
@@ -293,10 +294,13 @@ pub(super) fn first_dimension(depth: u32) -> u32 {
 pub(super) fn neighbours(
     world: &World,
     batch: &Batch,
-    ray: &Ray,
+    (ray, sample): (&Ray, u32),
     from_camera: bool,
 ) -> Option<[Ray; 2]> {
-    (from_camera && batch.step > 0.0).then(|| world.camera.neighbours(ray, batch.step))
+    (from_camera && batch.step > 0.0).then(|| {
+        let moved = batch.camera(world, sample);
+        (moved.as_ref().unwrap_or(&world.camera)).neighbours(ray, batch.step)
+    })
 }
 
 /// Frame in which a constant material is evaluated.

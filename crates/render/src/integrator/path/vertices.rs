@@ -248,7 +248,8 @@ impl Vertices {
                     };
                     let surface = block.surface(lane);
                     let ray = &current.rays[index];
-                    let neighbours = neighbours(world, batch, ray, meeting.from_camera);
+                    let own = (ray, current.states[index].sample);
+                    let neighbours = neighbours(world, batch, own, meeting.from_camera);
                     let (bsdf, frame) =
                         varying.shade(&world.shapes, &surface, hit, neighbours.as_ref());
                     self.local.set(lane, frame, surface.wo);

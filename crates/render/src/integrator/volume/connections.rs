@@ -49,7 +49,8 @@ impl Connections {
         while !self.current.is_empty() && !tracer.is_stopped() {
             self.rays.clear();
             self.rays.extend(self.current.iter().map(|found| found.ray));
-            self.hits.find(tracer, &self.rays);
+            let samples = self.current.iter().map(|found| found.sample);
+            self.hits.find(tracer, &self.rays, samples);
             for index in 0..self.current.len() {
                 self.advance(world, batch, index);
             }
@@ -63,7 +64,8 @@ impl Connections {
     fn trace_at_once(&mut self, world: &World, tracer: &mut Tracer, batch: &mut Batch) {
         self.rays.clear();
         self.rays.extend(self.current.iter().map(|found| found.ray));
-        let (occluded, costs) = tracer.occluded(&self.rays);
+        let samples = self.current.iter().map(|found| found.sample);
+        let (occluded, costs) = tracer.occluded(&self.rays, samples);
         for (connection, &occluded) in self.current.iter_mut().zip(occluded) {
             if !occluded {
                 connection.pass(world, connection.ray.tfar);

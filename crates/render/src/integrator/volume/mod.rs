@@ -131,7 +131,8 @@ impl VolumePathTracer {
             self.current.push(ray, state);
         }
         while !self.current.rays.is_empty() && !tracer.is_stopped() {
-            self.hits.find(tracer, &self.current.rays);
+            let samples = self.current.states.iter().map(|state| state.sample);
+            self.hits.find(tracer, &self.current.rays, samples);
             self.next.clear();
             for index in 0..self.current.rays.len() {
                 self.advance(world, batch, index);
@@ -186,7 +187,7 @@ impl VolumePathTracer {
             Material::None => return,
             Material::Constant(bsdf) => (bsdf, shading_frame(world, bsdf, &surface)),
             Material::Varying(varying) => {
-                let near = neighbours(world, batch, &ray, state.from_camera);
+                let near = neighbours(world, batch, (&ray, state.sample), state.from_camera);
                 made = varying.shade(&world.shapes, &surface, &hit, near.as_ref());
                 (&made.0, made.1)
             }
