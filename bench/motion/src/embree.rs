@@ -89,6 +89,7 @@ pub struct Embree {
 macro_rules! function {
     ($library:expr, $name:literal, $type:ty) => {{
         // SAFETY: Embree 4 exports a function of this type by this name.
+        #[allow(unused_unsafe)]
         let symbol = unsafe { $library.get::<$type>(concat!($name, "\0").as_bytes()) };
         *symbol.expect($name)
     }};

@@ -11,7 +11,7 @@ use serde::Serialize;
 pub struct Camera {
     /// Camera space to world space.
     pub world_from_camera: Mat4,
-    /// Camera space to world space at time 1, if the camera moves; `world_from_camera` is then that of time 0. Between, it moves
+    /// Camera space to world space at time 1, if the camera moves; `world_from_camera` is then its place at time 0. Between, it moves
     /// as an [`Instance`](crate::Instance) does.
     pub end: Option<Mat4>,
     /// Times at which the shutter opens and closes. Times before 0 and after 1 see what there is at 0 and 1.

@@ -31,8 +31,8 @@ use crate::tree::motion::Keys;
 
 /// A tree over a scene that moves, in which every ray has a time.
 ///
-/// Times go from 0, the first key, to 1, the last one. Times outside are clamped, and NaN counts as 0. An answer at a time is that of
-/// [`Brute`](crate::Brute) over [`MovingScene::at`] that time, for every recipe, width and level, alone and in batches.
+/// Times go from 0, the first key, to 1, the last one. Times outside are clamped, and NaN counts as 0. An answer at a time equals
+/// the answer of [`Brute`](crate::Brute) over [`MovingScene::at`] that time, for every recipe, width and level, for single rays and in batches.
 ///
 /// Each span between two keys has a tree of its own, which is built and learned in the middle of the span. Boxes
 /// move along: a node tests where its boxes are at the time of the ray. Objects are stored once for every span.
@@ -67,7 +67,7 @@ impl MovingBvh {
         Self::learn(scene, &[], &[], recipe)
     }
 
-    /// Builds the trees of a scene, each learned from those of `rays` whose times are in its span: `times[i]` is the time of
+    /// Builds the trees of a scene, each learned from the `rays` whose times are in its span: `times[i]` is the time of
     /// `rays[i]`. They are followed through the middle of the span.
     ///
     /// # Errors
@@ -94,7 +94,7 @@ impl MovingBvh {
     }
 
     /// Makes trees of one's own move, one for each span: tree `i` is one over [`MovingScene::middle`] of span `i`, however it
-    /// was built. `motion` is that of the scene.
+    /// was built. `motion` belongs to the scene.
     ///
     /// # Errors
     /// [`Error::OtherKeys`] if there are not as many trees as spans; [`Error::PrimitiveIsGone`] if a triangle of a moving mesh is not
@@ -306,6 +306,17 @@ impl Bvh {
 /// What moves in a scene, made ready for trees: see [`MovingBvh::from_trees`].
 ///
 /// Keeps copies of the keys, and none of what does not move.
+///
+/// ```
+/// use antumbra::{Motion, MovingInstance, MovingScene, Geometry, Sphere};
+///
+/// let ball = vec![Geometry::spheres(vec![Sphere { center: [0.0; 3], radius: 1.0 }])];
+/// let place = |x| [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+/// let instance = MovingInstance::new(0, vec![place(0.0), place(8.0)]);
+/// let motion = Motion::new(&MovingScene::new(vec![], vec![ball], vec![instance])?)?;
+/// assert!(motion.bounds().max[0] >= 9.0);
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone)]
 pub struct Motion {
     spans: Vec<SpanKeys>,

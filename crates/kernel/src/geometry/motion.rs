@@ -222,6 +222,13 @@ impl MovingInstance {
 }
 
 /// One geometry of a scene that moves; its place in the list is the `geom_id`.
+///
+/// ```
+/// use antumbra::{Geometry, MovingGeometry, Sphere};
+///
+/// let ball = Geometry::spheres(vec![Sphere { center: [0.0; 3], radius: 1.0 }]);
+/// assert!(matches!(MovingGeometry::from(ball), MovingGeometry::Still(_)));
+/// ```
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum MovingGeometry<'a> {
@@ -246,6 +253,16 @@ impl<'a> From<MovingMesh<'a>> for MovingGeometry<'a> {
 /// A scene whose meshes and instances move from time 0 to time 1: see [`MovingBvh`](crate::MovingBvh).
 ///
 /// Objects do not change inside: instances of them move.
+///
+/// ```
+/// use antumbra::{MovingMesh, MovingScene};
+///
+/// let at = |x: f32| vec![[x, 0.0, 1.0], [x + 1.0, 0.0, 1.0], [x, 1.0, 1.0]];
+/// let mesh = MovingMesh::new(vec![at(0.0).into(), at(4.0).into()], vec![[0, 1, 2]]);
+/// let scene = MovingScene::new(vec![mesh.into()], vec![], vec![])?;
+/// assert_eq!((scene.spans(), scene.at(0.5)?.bounds().min[0]), (1, 2.0));
+/// # Ok::<(), antumbra::Error>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct MovingScene<'a> {
     pub(crate) world: Vec<MovingGeometry<'a>>,

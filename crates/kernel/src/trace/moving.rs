@@ -1,6 +1,6 @@
 //! Queries at a time: occlusion and closest hits in trees that move, see [`crate::tree::motion`].
 //!
-//! Loops, stacks and leaf tests are those of static trees. A ray knows its share of the span, and interpolates the boxes of a node
+//! Loops, stacks and leaf tests are the same as in static trees. A ray knows its share of the span, and interpolates the boxes of a node
 //! and the corners of a leaf before they are tested, and the transform of an instance before it is entered.
 
 use antumbra_simd::{Lanes, Simd, Width, WithSimd};

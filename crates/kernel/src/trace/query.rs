@@ -76,7 +76,7 @@ pub(crate) trait Query {
         test.step(simd, &bvh.nodes[index].planes, limit)
     }
 
-    /// Asks for the memory of a node.
+    /// Prefetches a node.
     #[inline(always)]
     fn prefetch<S: Simd, const N: usize>(simd: S, bvh: &WideTree<N>, index: usize) {
         // No check: nothing is read.

@@ -9,7 +9,7 @@
 //! - A box that holds a corner at both keys holds the exact corner between them at all times. A corner is computed by three
 //!   operations, with an error of at most `5 u R`. So is a plane.
 //! - A node above a triangle that is hit has `32 u R` to spare, and a static tree uses less than `16.3 u R` of it.
-//! - The box of an instance at a time is that of its path, see [`crate::geometry::path`]. Boxes of nodes around it are wider by
+//! - The box of an instance at a time comes from its path, see [`crate::geometry::path`]. Boxes of nodes around it are wider by
 //!   [`INSTANCE`] times the scene extent at both keys, more than computing either takes.
 
 use alloc::format;
@@ -36,7 +36,7 @@ const INSTANCE: f32 = 1.0 / (1 << 20) as f32;
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct NodeMotion<const N: usize> {
-    /// How far planes move from the start of the span to its end. Those of empty lanes do not.
+    /// How far planes move from the start of the span to its end. Planes of empty lanes do not.
     pub planes: [[[f32; N]; 2]; 3],
 }
 
@@ -47,7 +47,7 @@ pub(crate) struct BlockMotion {
     corners: [[[f32; BLOCK]; 3]; 3],
 }
 
-/// What moves in a tree during a span. The tree itself is that of the start.
+/// What moves in a tree during a span. The tree itself is the tree of the start.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion<const N: usize> {
     /// For each node of the tree of the world. Objects do not change inside.

@@ -37,7 +37,7 @@ pub(crate) struct WideTree<const N: usize> {
     pub depth: usize,
     /// How occlusion queries pick the next child.
     pub pick: Rule,
-    /// What moves; then nodes and leaves are those of the start of a span.
+    /// What moves; then nodes and leaves are at the start of a span.
     pub motion: Option<Arc<Motion<N>>>,
 }
 
