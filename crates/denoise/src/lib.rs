@@ -20,7 +20,7 @@ pub enum Error {
          `pip install pyoidn`, or name its folder by --library or OIDN_LIBRARY"
     )]
     Missing {
-        /// What was tried last, and what the system says.
+        /// The last path tried, and the message of the system.
         reason: String,
     },
     /// The library has another version than 2.
@@ -34,7 +34,7 @@ pub enum Error {
     /// A list does not have a value for every pixel.
     #[error("{found} values of {what} were given for {expected} pixels")]
     Count {
-        /// What the list holds.
+        /// Name of the list.
         what: &'static str,
         /// Number of pixels.
         expected: usize,

@@ -182,7 +182,7 @@ fn as_errors(warnings: &[Warning]) -> String {
     lines.join("\n")
 }
 
-/// What is wrong with an extension.
+/// Message about an extension that no reader has.
 fn unknown(extension: &str) -> String {
     match extension {
         "" => "a scene file has an extension that tells its format".to_owned(),

@@ -59,11 +59,11 @@ pub struct Loaded {
     pub notes: Vec<Diagnostic>,
     /// Features of a mesh file that are left out or mapped to something else, each named once.
     pub left_out: Vec<String>,
-    /// What is missing in a mesh file, and whether nothing can be seen of it. The scene is complete, but looks different.
+    /// Things missing in a mesh file, or that the mesh is invisible. The scene is complete, but looks different.
     pub warnings: Vec<Warning>,
     /// Whether every surface of a mesh file is wholly transparent. A warning says so.
     pub is_invisible: bool,
-    /// What a mesh file says of camera and lights. `None` for scenes that bring all themselves.
+    /// Camera and lights that a mesh file has. `None` for scenes that bring all themselves.
     pub stage: Option<OwnStage>,
     /// Which way is up, and why.
     pub up: Upright,

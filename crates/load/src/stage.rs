@@ -160,7 +160,7 @@ pub struct Stage {
     pub sky: Option<Sky>,
 }
 
-/// What a file of meshes says of its stage.
+/// Parts of the stage that a file of meshes brings itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OwnStage {
     /// Whether the file has a camera.

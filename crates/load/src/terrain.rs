@@ -72,7 +72,7 @@ pub fn load_heights(path: &Path, options: &Options) -> Result<Heights, Error> {
     })
 }
 
-/// What speaks against the raster being in one unit of length.
+/// Warnings about a raster that seems not to be in one unit of length.
 fn warnings(path: &Path, grid: &Grid) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let mut warn = |text: String| {

@@ -15,7 +15,7 @@ use crate::stage::Up;
 pub struct Upright {
     /// The axis.
     pub axis: Up,
-    /// What speaks for it, as the end of a sentence such as "z is up, ...".
+    /// Reason for the axis, as the end of a sentence such as "z is up, ...".
     pub reason: &'static str,
 }
 

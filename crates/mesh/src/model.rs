@@ -64,7 +64,7 @@ impl Model {
 pub struct Warning {
     /// File, with line and column where the format has them.
     pub place: String,
-    /// What is missing, and what replaces it.
+    /// Sentence that names the missing thing and its replacement.
     pub text: String,
 }
 

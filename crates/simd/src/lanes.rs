@@ -15,7 +15,7 @@ pub trait Lanes<const N: usize>:
     type Token: Copy;
     /// Result of a comparison.
     type Mask: Mask<N>;
-    /// As many lanes in double precision.
+    /// Vector of as many lanes in double precision.
     type Double: Doubles;
 
     /// `N` copies of `x`.
@@ -50,7 +50,7 @@ pub trait Lanes<const N: usize>:
     ///
     /// Results differ between levels: use the operation in conservative tests only, never where it decides an answer.
     fn mul_sub(self, b: Self, c: Self) -> Self;
-    /// The same numbers in double precision.
+    /// Converts each lane to double precision, which is exact.
     fn widen(self) -> Self::Double;
     /// Rounds to single precision: out of its range to an infinity or zero of the same sign.
     fn narrow(double: Self::Double) -> Self;

@@ -10,7 +10,7 @@ use core::fmt;
 /// A name that is in no row of a list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownName {
-    /// What was to be named: `order`, `builder` ...
+    /// Kind of the thing named: `order`, `builder` ...
     pub kind: &'static str,
     /// The name found.
     pub name: String,

@@ -27,7 +27,7 @@ pub struct Bake<'a> {
     pub machine: &'a MachineArgs,
     /// Shares to take instead of computing anything.
     pub parts: Option<&'a [PartFile]>,
-    /// What the scene is bent by.
+    /// Curvature of the earth that was applied to the scene.
     pub earth: Option<Earth>,
 }
 

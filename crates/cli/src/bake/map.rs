@@ -33,7 +33,7 @@ const MONTHS: [&str; 12] = [
     "December",
 ];
 
-/// What a map says of its values.
+/// Texts of a map.
 #[derive(Default)]
 pub struct Words<'a> {
     /// Title, where the command line has none.

@@ -6,7 +6,7 @@ use antumbra_render::Camera;
 use super::ground::Ground;
 use crate::exit::Failure;
 
-/// What the pixels of a picture show.
+/// Points of the scene that the pixels of a picture show.
 pub struct View {
     /// Size of the full picture.
     size: [usize; 2],
@@ -23,7 +23,7 @@ impl View {
     /// Points of a pixel, in two rows of two.
     pub const POINTS: usize = 4;
 
-    /// What the camera of the scene sees.
+    /// The view from the camera of the scene.
     pub fn new(ground: &Ground) -> Result<Self, Failure> {
         let scene = &ground.loaded.scene;
         let camera = Camera::new(&scene.camera, &scene.film)

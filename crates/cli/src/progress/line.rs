@@ -14,7 +14,7 @@ const TITLES: [usize; 2] = [24, 40];
 pub struct Line {
     /// Name of the scene or piece of work. May be empty.
     pub title: String,
-    /// What is being done, in words.
+    /// Name of the work that is under way.
     pub doing: String,
     /// Piece of work that is under way, and how many there are, if there are several.
     pub piece: Option<[usize; 2]>,

@@ -170,7 +170,7 @@ mod tests {
         }
     }
 
-    /// As if a piece had taken so long.
+    /// Finishes a piece as if it had taken this long.
     fn work_for(list: &mut List, step: Step, seconds: u64) {
         list.since -= Duration::from_secs(seconds);
         list.finished(step, true);

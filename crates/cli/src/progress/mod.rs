@@ -52,7 +52,7 @@ pub struct Progress {
     journal: Option<PathBuf>,
 }
 
-/// What the line is made of.
+/// State from which the line is written.
 struct State {
     work: Mutex<Work>,
     /// Samples and rays since the picture was begun.

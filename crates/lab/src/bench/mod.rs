@@ -397,7 +397,7 @@ impl Bench<'_> {
         Ok(())
     }
 
-    /// What there is beside plain triangles, on one instruction set.
+    /// Measures everything beside plain triangles, on one instruction set.
     fn kinds(&mut self, subject: &Subject, recipe: Recipe, isa: Isa) -> Result<(), Error> {
         let plan = kinds::Plan {
             scene: subject.name,

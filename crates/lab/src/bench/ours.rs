@@ -15,7 +15,7 @@ pub struct Tree {
     pub label: TreeLabel,
 }
 
-/// What the trees of a scene share.
+/// Binary tree, training log and rays that the trees of a scene share.
 pub struct Ingredients {
     stage: Stage,
     log: TreeLog,

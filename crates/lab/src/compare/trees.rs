@@ -36,7 +36,7 @@ pub struct Ready {
     pub bvh: Bvh,
     /// Place of its first tree.
     pub first: usize,
-    /// What was learned, and how long that took.
+    /// Rays, predicted costs and times of learning.
     pub figures: LearningFigures,
     /// Time of the first tree.
     pub build: Duration,

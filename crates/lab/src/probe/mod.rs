@@ -31,7 +31,7 @@ use rays::Lots;
 
 pub use row::{Row, csv};
 
-/// What is tried.
+/// An experiment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Part {
     /// A way of picking for each node.
@@ -62,7 +62,7 @@ impl Part {
 /// Choices of a probe.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// What is tried.
+    /// Experiments to run.
     pub parts: Vec<Part>,
     /// Children per node.
     pub width: Width,

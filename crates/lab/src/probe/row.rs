@@ -18,7 +18,7 @@ pub use crate::counted::counted;
 pub struct Row {
     /// Name of the scene.
     pub scene: String,
-    /// What was tried.
+    /// Name of the experiment.
     pub part: &'static str,
     /// Kind of the rays.
     pub rays: &'static str,

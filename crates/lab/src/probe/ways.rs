@@ -10,7 +10,7 @@ use super::{Part, Subject};
 use crate::Error;
 use crate::study::Kind;
 
-/// What is compared. The first is what speeds are relative to.
+/// Orders that are compared. Speeds are relative to the first one.
 const ORDERS: [Order; 8] = [
     Order::Simple,
     Order::Ftob,

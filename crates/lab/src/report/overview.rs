@@ -25,7 +25,7 @@ pub fn overview(plan: &Plan, rows: &[&Row], summary: &Summary) -> Result<Vec<Blo
     Ok(blocks)
 }
 
-/// What builder, collapse and order each bring from the trees of the paper to the default.
+/// Gains of builder, collapse and order, from the trees of the paper to the default.
 fn ablation_block(plan: &Plan, summary: &Summary, kind: Kind) -> Option<Block> {
     let mut lines = Vec::new();
     for &width in &plan.widths {

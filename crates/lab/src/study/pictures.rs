@@ -11,7 +11,7 @@ use super::plan::{Combination, Plan, Subject};
 use super::row::{Common, Row};
 use crate::{Error, Watcher, compare};
 
-/// What all pictures of a scene share.
+/// Plan, scene and rendering that all pictures of a scene share.
 pub struct Studio<'a> {
     pub plan: &'a Plan,
     pub subject: &'a Subject,

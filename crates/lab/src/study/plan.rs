@@ -38,7 +38,7 @@ pub struct Plan {
     pub log_size: LogSize,
     /// Origin of the training rays of replays.
     pub rays_from: RaysFrom,
-    /// What steps of a traversal cost: to learn by, and to rank by.
+    /// Costs of traversal steps, by which trees are learned and ranked.
     pub costs: CostModel,
     /// Other costs of a primitive test. On pictures, the child orders of the base tree are learned by these as well.
     pub more_prim_costs: Vec<f32>,
@@ -118,7 +118,7 @@ impl Combination {
         }
     }
 
-    /// What renderings use unless something else is chosen.
+    /// Defaults of renderings.
     pub fn default_of(width: Width) -> Self {
         Self {
             width,

@@ -1,4 +1,4 @@
-//! What Embree calls back for user geometry: the functions that our kernel calls, too.
+//! Callbacks of user geometry for Embree: the functions that our kernel calls, too.
 
 use std::ffi::{c_int, c_uint, c_void};
 use std::sync::Arc;

@@ -16,16 +16,16 @@ pub fn masks() -> Masks {
     masks
 }
 
-/// What counts.
+/// Condition on the hits that count.
 #[derive(Clone, Copy)]
 pub enum Condition<'a> {
     /// Hits at the ends of the interval as well.
     Closed,
-    /// What the mask of the ray shows.
+    /// Hits in geometry that the mask of the ray shows.
     Mask,
     /// All but one primitive for each ray.
     Except(&'a [PrimId]),
-    /// What a closure accepts: three of four primitives.
+    /// Hits that a closure accepts: three of four primitives.
     Filter,
     /// The first hit of a visit.
     Visit,

@@ -1,4 +1,4 @@
-//! What there is beside plain triangles, and what it costs: quads, user geometry, conditions on hits, vertices that move,
+//! Cost of everything beside plain triangles: quads, user geometry, conditions on hits, vertices that move,
 //! points. Beside Embree, where it has the same.
 //!
 //! - this file: which rows there are;  `shapes`: one mesh as several kinds of geometry
@@ -28,7 +28,7 @@ use shapes::Merged;
 /// Rays, or points, of each kind that are compared with brute force.
 const BRUTE_RAYS: usize = 64;
 
-/// What is measured, and how.
+/// Scene, rays and recipe of one measurement.
 pub struct Plan<'a> {
     pub scene: &'a str,
     pub model: &'a Lowered<'a>,

@@ -1,4 +1,4 @@
-//! What is nearest to points: ours in double precision, Embree's with a function in single precision.
+//! Nearest primitives of points: ours in double precision, Embree's with a function in single precision.
 
 use std::sync::Arc;
 use std::time::Instant;
