@@ -11,7 +11,7 @@ use crate::texture::Cutouts;
 use crate::texture::Textures;
 
 /// Geometry of a scene, as the kernel takes it. Meshes are borrowed from the scene.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Lowered<'s> {
     /// Shapes of the world.
     pub world: Vec<antumbra::Geometry<'s>>,
@@ -20,7 +20,7 @@ pub struct Lowered<'s> {
     /// Placed objects, where they are at time 0.
     pub instances: Vec<antumbra::Instance>,
     /// The same with the keys of those that move. Empty where nothing moves.
-    pub(crate) moving: Vec<MovingInstance>,
+    pub moving: Vec<MovingInstance>,
 }
 
 impl<'s> Lowered<'s> {

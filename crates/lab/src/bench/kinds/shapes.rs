@@ -72,8 +72,7 @@ impl Merged {
 pub fn lowered(geometry: Geometry<'_>) -> Lowered<'_> {
     Lowered {
         world: vec![geometry],
-        objects: Vec::new(),
-        instances: Vec::new(),
+        ..Lowered::default()
     }
 }
 
