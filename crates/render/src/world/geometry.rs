@@ -19,8 +19,6 @@ pub struct Lowered<'s> {
     pub objects: Vec<Vec<antumbra::Geometry<'s>>>,
     /// Placed objects, where they are at time 0.
     pub instances: Vec<antumbra::Instance>,
-    /// The same with the keys of those that move. Empty where nothing moves.
-    pub moving: Vec<MovingInstance>,
 }
 
 impl<'s> Lowered<'s> {
@@ -37,28 +35,25 @@ impl<'s> Lowered<'s> {
             world: of_shapes(&scene.shapes),
             objects: objects.map(|object| of_shapes(&object.shapes)).collect(),
             instances: scene.instances.iter().map(of_instance).collect(),
-            moving: match scene.instances.iter().any(|one| one.end.is_some()) {
-                true => scene.instances.iter().map(moving_instance).collect(),
-                false => Vec::new(),
-            },
         }
     }
 
-    /// The scene as the kernel traces it at any time; `None` where nothing moves.
+    /// The geometry with the keys of `scene`, whose it is; `None` where no instance moves.
     ///
     /// # Errors
     /// As [`MovingScene::new`].
-    pub(crate) fn moving(&self) -> Result<Option<MovingScene<'s>>, antumbra::Error> {
-        if self.moving.is_empty() {
+    pub(crate) fn moving(&self, scene: &Scene) -> Result<Option<MovingScene<'s>>, antumbra::Error> {
+        if !scene.instances.iter().any(|one| one.end.is_some()) {
             return Ok(None);
         }
+        let instances = scene.instances.iter().map(moving_instance).collect();
         let world = self
             .world
             .iter()
             .cloned()
             .map(MovingGeometry::from)
             .collect();
-        MovingScene::new(world, self.objects.clone(), self.moving.clone()).map(Some)
+        MovingScene::new(world, self.objects.clone(), instances).map(Some)
     }
 
     /// Primitives of the kernel, checked.

@@ -101,7 +101,7 @@ impl World {
         check(scene)?;
         let mut textures = Textures::default();
         let lowered = Lowered::with(scene, &mut textures);
-        let moving = lowered.moving().map_err(Error::Geometry)?;
+        let moving = lowered.moving(scene).map_err(Error::Geometry)?;
         let (primitives, bounds, motion) = match moving {
             None => {
                 let primitives = lowered.primitives().map_err(Error::Geometry)?;
