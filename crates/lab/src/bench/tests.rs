@@ -104,7 +104,6 @@ fn model(random: &mut Random) -> Lowered<'static> {
         instances: [0, 1, 1, 0, 1, 0]
             .map(|object| random.instance(object))
             .into(),
-        moving: Vec::new(),
     }
 }
 
