@@ -806,7 +806,8 @@ ANTUMBRA_API void antumbra_hit_lists_free(antumbra_hit_lists *lists);
 /* Directions, sorted for the kernel. */
 typedef struct antumbra_directions antumbra_directions;
 
-/* Prepares directions of 3 floats, of any length. A direction that is zero or not finite has the bit 0 for all points. */
+/* Prepares directions of 3 floats, of any length. A direction that is zero, not finite or shorter than 3e-39 has the bit 0
+   for all points. */
 ANTUMBRA_API antumbra_status antumbra_directions_new(const float *directions, size_t count, size_t stride,
                                                      antumbra_directions **prepared);
 

@@ -265,16 +265,14 @@ unsafe fn agree(
                 dir,
                 tfar: group.tfar,
             };
-            let is_ray = org.iter().chain(&dir).all(|x| x.is_finite()) && dir != [0.0; 3];
+            let longest = dir.iter().fold(0.0_f32, |longest, x| longest.max(x.abs()));
+            let is_ray =
+                org.iter().chain(&dir).all(|x| x.is_finite()) && (1.0 / longest).is_finite();
             let mut occluded = false;
             // SAFETY: the promise of this function.
             assert!(done(unsafe {
                 antumbra_occluded1(bvh, &ray, &mut occluded)
             }));
-            // Groups take directions whose square is 0 as no directions, and single rays do not.
-            if dir != [0.0; 3] && dir.iter().all(|x| x * x == 0.0) {
-                continue;
-            }
             let is_open = bits[point * count.div_ceil(64) + place / 64] >> (place % 64) & 1 == 1;
             assert!(
                 is_open == (is_ray && !occluded) || tnear.is_nan() || group.tfar.is_nan(),

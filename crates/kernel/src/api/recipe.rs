@@ -116,7 +116,7 @@ named_list! {
 }
 
 impl Preset {
-    /// Choices that the name stands for.
+    /// The recipe of this name.
     pub fn recipe(self) -> Recipe {
         self.properties()()
     }
@@ -215,7 +215,7 @@ impl Recipe {
         self
     }
 
-    /// With another seed of everything random in learning.
+    /// Sets the seed of all random choices in learning, by default 0.
     pub fn seed(mut self, seed: u64) -> Self {
         self.training.seed = seed;
         self

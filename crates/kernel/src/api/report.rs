@@ -56,7 +56,7 @@ pub struct BuildReport {
     pub training_rays: u64,
     /// Whether batches fetch nodes and leaves before their turn: see [`Recipe::prefetch`](crate::Recipe::prefetch).
     pub prefetches: bool,
-    /// How long the steps took; `None` without a [clock](crate::Recipe::clock).
+    /// Times of the steps; `None` without a [clock](crate::Recipe::clock).
     pub times: Option<BuildTimes>,
 }
 

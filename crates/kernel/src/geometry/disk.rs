@@ -28,7 +28,7 @@ use crate::ray::{Hit, Ray};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disk {
-    /// Centre.
+    /// Centre, in the coordinates of the geometry.
     pub center: [f32; 3],
     /// Normal, of any length. A disk is dropped at build if its normal is zero.
     pub normal: [f32; 3],

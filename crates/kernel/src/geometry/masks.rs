@@ -43,7 +43,7 @@ impl Masks {
         Self::default()
     }
 
-    /// With these masks of geometries that lie in the world itself, by `geom_id`.
+    /// Sets the masks of the geometries outside of objects, indexed by `geom_id`.
     #[must_use]
     pub fn world(self, world: Vec<u32>) -> Self {
         Self { world, ..self }

@@ -38,7 +38,7 @@ pub struct Brute {
 }
 
 impl Brute {
-    /// Keeps a copy of the primitives.
+    /// Copies the primitives. Queries test every one of them: an oracle for comparisons, not for speed.
     #[must_use]
     pub fn new(primitives: &Primitives) -> Self {
         let reach = primitives.bounds().reach();

@@ -38,7 +38,7 @@ use crate::tree::wide::WideTree;
 #[repr(C)]
 #[non_exhaustive]
 pub struct Surface {
-    /// Distance, barycentrics and ids.
+    /// The hit: distance, barycentric coordinates and ids.
     pub hit: Hit,
     /// The point in the world: that of the ray at the distance `t`, worked out in double precision. On a triangle it is moved to
     /// its plane, from which it is then away by no more than the rounding of the three coordinates, half a unit in the last place

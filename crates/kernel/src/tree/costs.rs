@@ -16,13 +16,13 @@ use crate::geometry::primitives::PrimKind;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct CostModel {
-    /// `C_mb`: testing the N boxes of a node.
+    /// Cost of testing the N boxes of a node (`C_mb` of the paper). Only ratios of the costs count, so any unit will do.
     pub node: f32,
-    /// `C_p`: testing one primitive.
+    /// Cost of testing one primitive (`C_p` of the paper).
     pub prim: f32,
-    /// Entering an instance and leaving it again, without the visits in between.
+    /// Cost of entering an instance and leaving it again, without the visits in between.
     pub entry: f32,
-    /// Testing one partly transparent triangle, or one primitive of user geometry.
+    /// Cost of testing one partly transparent triangle, or one primitive of user geometry.
     pub cutout: f32,
 }
 
