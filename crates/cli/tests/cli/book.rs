@@ -49,6 +49,7 @@ fn links_lead_to_files_and_headings() {
         "CONTRIBUTING.md",
         "ARCHITECTURE.md",
         "bench/performance.md",
+        "bench/results.md",
     ];
     let mut all: Vec<_> = outside.map(|name| root().join(name)).into();
     pages(&root().join("docs"), &mut all);
