@@ -20,9 +20,9 @@ use crate::ray::Ray;
     reason = "there is one for a batch, and a box would need memory"
 )]
 pub enum Rays<'a> {
-    /// One after the other.
+    /// A slice of rays, one item each.
     List(&'a [Ray]),
-    /// In arrays of their own.
+    /// One array for each field of a ray: origins, directions and intervals, as numpy and C programs have them.
     Columns(RayColumns<'a>),
 }
 

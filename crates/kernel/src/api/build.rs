@@ -77,7 +77,7 @@ impl<'a> Build<'a> {
         }
     }
 
-    /// With another recipe.
+    /// Sets the recipe: builder, collapse, order, width, instruction set and costs. Default: [`Recipe::default`].
     pub fn recipe(self, recipe: &Recipe) -> Self {
         Self {
             recipe: *recipe,

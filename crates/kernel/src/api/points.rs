@@ -338,7 +338,7 @@ impl Brute {
         })
     }
 
-    /// [`Bvh::contains`].
+    /// Whether the point is inside, from a test of every primitive: the answer that [`Bvh::contains`] must have.
     #[must_use]
     pub fn contains(&self, point: impl Into<[f32; 3]>) -> bool {
         self.around(point.into()).is_inside

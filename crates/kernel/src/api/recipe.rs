@@ -169,7 +169,7 @@ impl Recipe {
             .training_rays(TrainingRays::Given)
     }
 
-    /// With another builder of the binary tree.
+    /// Sets the builder of the binary tree. Default: [`Builder::Reinsertion`].
     pub fn builder(self, builder: Builder) -> Self {
         Self { builder, ..self }
     }
@@ -189,7 +189,7 @@ impl Recipe {
         Self { width, ..self }
     }
 
-    /// For another instruction set, and the width that suits it.
+    /// Sets the instruction set, and the width that suits it: call [`Recipe::width`] afterwards for another width.
     pub fn isa(self, isa: Isa) -> Self {
         Self {
             isa,

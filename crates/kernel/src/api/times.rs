@@ -2,7 +2,7 @@
 
 use core::time::Duration;
 
-/// Clock: the time that has passed since some moment, always the same one.
+/// Clock of a build: returns the time since a fixed moment, such as the start of the program.
 pub type Clock = fn() -> Duration;
 
 /// How long the steps of [`Bvh::learn`](crate::Bvh::learn) took.

@@ -77,7 +77,8 @@ impl Collapse {
     }
 }
 
-/// Choices of a collapse by a training log, see [`Laboratory`](crate::lab::Laboratory).
+/// What a collapse takes from a training log: the nodes that stay, the leaves that are split, and the order of children.
+/// Used by [`Laboratory`](crate::lab::Laboratory).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learning {
     /// Which binary nodes stay.

@@ -40,7 +40,7 @@ pub enum CurveBasis {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct CubicSegments {
-    /// The segments.
+    /// Straight segments of all cubic curves, in the order of the curves.
     pub curves: Curves<'static>,
     /// For each segment, the index of its cubic curve and the part of that curve's parameter, from 0 to 1, that it stands for: a hit
     /// at `u` is at the parameter `from + u * (to - from)`.

@@ -57,7 +57,7 @@ impl LocalOrigin {
         core::array::from_fn(|axis| (point[axis] - self.origin[axis]) as f32)
     }
 
-    /// The point of the world that is seen from here at `point`. NaN stays NaN.
+    /// World coordinates of `point`, which is relative to this origin: their sum in double precision. NaN stays NaN.
     pub fn world(&self, point: [f32; 3]) -> [f64; 3] {
         core::array::from_fn(|axis| f64::from(point[axis]) + self.origin[axis])
     }

@@ -37,9 +37,10 @@ use crate::tree::wide::WideTree;
 pub enum Events {
     /// Not at all: equation (1), from the same counts.
     Independent,
-    /// A ray is occluded below one child at most.
+    /// Exclusive: a ray is occluded below at most one child, so the shares of occluded rays add up.
     Exclusive,
-    /// Of two children below which a ray is occluded, pairs tell how often that happens.
+    /// Overlapping: counts of pairs of children say how many rays are occluded below both, and the sum leaves these out
+    /// (Hunter's bound).
     Overlapping,
     /// Children do not depend on each other, but on which child a ray hits.
     Paired,

@@ -103,7 +103,7 @@ pub trait Laboratory: Sized {
     /// If the order was planned for a tree of another shape.
     fn apply(&mut self, order: &SlotOrder);
 
-    /// Log of this kind of what `rays` meet in this tree. `seed` starts the shuffling, if the kind asks for it.
+    /// Traces `rays` in this tree and returns their log. `seed` starts the shuffling of children, for kinds that shuffle.
     fn log_of(&self, rays: &[Ray], kind: LogKind, seed: u64) -> Log;
 
     /// Puts a tree fresh from its collapse into the order of a recipe, learned from `log` or else from `rays`. Where the

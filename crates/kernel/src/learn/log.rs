@@ -60,7 +60,8 @@ impl LogKind {
     }
 }
 
-/// Counters of one worker, or the sum of several.
+/// Training log of one tree: counts of rays by node, child and primitive, as far as its [`LogKind`] needs them.
+/// Each thread fills a log of its own, and [`Log::merge`] adds them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Log {
     pub(crate) kind: LogKind,
@@ -100,7 +101,7 @@ impl Log {
         }
     }
 
-    /// The kind of log.
+    /// What the log counts, and so which orders it can plan: see [`LogKind`].
     pub fn kind(&self) -> LogKind {
         self.kind
     }
@@ -122,8 +123,8 @@ impl Log {
     }
 
     #[cfg(feature = "lab")]
-    /// Adds the counters of another worker. Addition of whole numbers, and nothing depends on the order of rays:
-    /// nor does the sum on how they were divided.
+    /// Adds the counters of another log of the same tree. Counters are whole numbers, so the sum does not depend on how
+    /// rays were divided among logs.
     ///
     /// # Panics
     /// If the other log was made for another tree or kind.
