@@ -8,9 +8,9 @@ import math
 import os
 import statistics
 
-import results_texts as texts
+from tables import texts
 
-ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 KINDS = {
     "setting": "what was chosen for a run or a rule, not measured",
     "cited": "a figure of others",
@@ -286,7 +286,7 @@ def packages(of):
 SOURCES = {
     "README.md": [("1.89", "Cargo.toml", 'rust-version = "1.89"'), ("JCGT 5(2), 2016", "cited"), ("Version 0.1", "Cargo.toml", 'version = "0.1.0"')],
     RESULTS: [
-        ("node tests + 0.15 primitive tests", "bench/results_records.py", "PRIM = 0.15"),
+        ("node tests + 0.15 primitive tests", "bench/tables/records.py", "PRIM = 0.15"),
         ("50 000 rays of each kind", "setting"),
         ("a bootstrap interval over scenes (95 %)", "defined"),
         ("learn from about 1 % of the shadow rays", "setting"),

@@ -5,7 +5,7 @@ import os
 import re
 import statistics
 
-RECORDS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "record")
+RECORDS = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "record")
 
 
 def lines(name):

@@ -1,8 +1,8 @@
 """Tables of studies: orders, builders, collapses and training rays."""
 
-from results_paper import paper_rows
-from results_probe import RAYS
-from results_records import *
+from tables.paper import paper_rows
+from tables.probe import RAYS
+from tables.records import *
 
 CORNERS = [(c, t) for c in ("area", "learned") for t in ("binned-sah", "reinsertion")]
 

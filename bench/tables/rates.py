@@ -4,7 +4,7 @@ import csv
 import json
 import os
 
-from results_records import *
+from tables.records import *
 
 def document(name):
     with open(os.path.join(ROOT, "bench/record", name)) as file:

@@ -7,7 +7,7 @@ import os
 import re
 
 
-ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..")
+ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 PAPER = "crates/lab/src/report/paper.csv"
 ORDERS = "simple random ftob sato embree rtsah sort- sort sort+ visits joint two-way octants".split()
 PAPER_ORDERS = "simple ftob sato sort- sort sort+".split()

@@ -5,8 +5,8 @@ import math
 import os
 import statistics
 
-from results_paper import *
-from results_records import *
+from tables.paper import *
+from tables.records import *
 
 EMBREE_ORDER = "zen3-2026-11-26-embree-order.csv"
 

@@ -6,7 +6,7 @@ import os
 import random
 import statistics
 
-from results_records import *
+from tables.records import *
 
 def paper_rows():
     with open(os.path.join(ROOT, PAPER), newline="") as file:
