@@ -22,7 +22,8 @@ REPLICATION, PERFORMANCE, COSTS = (f"docs/src/{n}.md" for n in ("replication", "
 RESULTS = ("docs/src/results.md", "docs/src/beyond-static-order.md")
 ORDER, EMBREE = (f"docs/src/{n}.md" for n in ("occlusion-order", "order-in-embree"))
 BAKING = tuple(f"docs/src/{n}.md" for n in ("occlusion-baking", "bakes", "sun-and-sky", "visibility"))
-PYTHON, RELIABILITY, BENCH = "docs/src/python/index.md", "docs/src/reliability.md", "bench/performance.md"
+PYTHON = ("docs/src/python/index.md", "docs/src/python/scenes.md")
+RELIABILITY, BENCH = "docs/src/reliability.md", "bench/performance.md"
 LONG = "bench/results.md"
 
 

@@ -135,7 +135,8 @@ def test_types_know_the_texts_that_arguments_take():
 
 def test_programs_on_the_pages_run(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for page in (DOCS / "index.md", DOCS / "many-machines.md", DOCS.parent / "first-python.md", DOCS.parents[2] / "README.md"):
+    pages = [DOCS / "index.md", DOCS / "scenes.md", DOCS / "many-machines.md", DOCS.parent / "first-python.md"]
+    for page in [*pages, DOCS.parents[2] / "README.md"]:
         names = {}
         for part in page.read_text().split("```python\n")[1:]:
             program = part.split("```")[0]

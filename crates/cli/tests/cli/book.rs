@@ -107,16 +107,13 @@ fn the_summary_lists_every_page_of_the_book() {
     );
 }
 
-/// Pages that are longer than the others may be: evidence, lists that are made from the program, and guides still to be divided.
-const LONG: [&str; 10] = [
+/// Pages that are longer than the others may be: evidence, lists that are made from the program.
+const LONG: [&str; 7] = [
     "commands/render.md",
     "commands/sun.md",
-    "from-embree.md",
     "pbrt-support.md",
-    "python/index.md",
     "python/reference.md",
     "reliability.md",
-    "renderer.md",
     "replication.md",
     "results.md",
 ];
