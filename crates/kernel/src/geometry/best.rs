@@ -11,7 +11,7 @@ use crate::ray::{Hit, INVALID_ID};
 #[repr(C, align(16))]
 pub(crate) struct Best {
     hit: Hit,
-    /// Distance beyond which nothing that the ray meets, where it is now, can become a better hit.
+    /// Distance beyond which nothing that the ray hits, in the space where it is now, can become a better hit.
     pub limit: f32,
     tfar: f32,
     interval: Interval,
@@ -72,8 +72,8 @@ impl Best {
         self.limit = self.limit_now();
     }
 
-    /// Takes a hit in the object where the ray is now, or in the world, if it precedes the best so far and, which
-    /// is asked last, `counts`. Returns whether it did.
+    /// Takes a hit in the object where the ray is now, or in the world, if it precedes the best so far and `counts`
+    /// returns true. Returns whether it was taken. `counts` is called last, and only for hits that precede the best.
     #[inline(always)]
     pub fn offer_if(&mut self, hit: Hit, counts: impl FnOnce() -> bool) -> bool {
         match self.preceded_by(hit) {

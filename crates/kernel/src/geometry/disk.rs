@@ -215,9 +215,10 @@ fn on_disk(point: [f64; 2], radius: f64) -> [f64; 2] {
 /// The nearest point to `point` on the image of a disk around the origin under a linear map: the images of two
 /// perpendicular directions in its plane, and a point in terms of them.
 ///
-/// With the images as the columns of `B`, the least `|B x - point|` with `|x| <= radius` solves `(B' B + l) x = B' point`
-/// for `l = 0`, or else for the `l > 0` that gives `x` the length of the radius. In the basis of eigenvectors of `B' B`,
-/// which are chosen as directions, that is an equation for `l` alone, found by bisection.
+/// With the images as the columns of `B`, the least `|B x - point|` with `|x| <= radius` solves
+/// `(B' B + l) x = B' point` for `l = 0`, or else for the `l > 0` that gives `x` the length of the radius. In the basis
+/// of eigenvectors of `B' B`, which are chosen as directions, that is an equation for the single unknown `l`, found by
+/// bisection.
 fn on_ellipse(
     affine: &Affine,
     axes: [[f64; 3]; 2],

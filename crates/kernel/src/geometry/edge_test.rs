@@ -78,7 +78,7 @@ pub(crate) struct Edges<V> {
     size: V,
 }
 
-/// The hits as far as they can be told without a division.
+/// Hits as far as they can be decided without a division.
 pub(crate) struct Verdict<M> {
     /// Lanes that are hit beyond doubt.
     pub sure: M,
@@ -150,7 +150,7 @@ impl<V> Edges<V> {
         }
     }
 
-    /// The barycentrics `u` and `v`, of meaning in lanes that are surely hit: those of
+    /// The barycentrics `u` and `v`, of meaning in lanes that are surely hit. Same values as from
     /// [`crate::geometry::triangle_hit::ShearedTriangle::barycentrics`].
     #[inline(always)]
     pub fn barycentrics<const L: usize>(&self) -> [V; 2]

@@ -32,7 +32,7 @@ use crate::ray::{Hit, Ray};
 #[repr(C)]
 pub(crate) struct CutoutBlock {
     pub triangles: TriangleBlock,
-    /// Per lane, what is known without asking the filter.
+    /// Per lane, what is known without calling the filter.
     pub maps: [MapRef; BLOCK],
     /// Per lane, what it shows: one of [`Filters::representatives`]; of no meaning in empty lanes.
     pub patterns: [u32; BLOCK],
@@ -42,8 +42,8 @@ pub(crate) struct CutoutBlock {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Filters {
     pub opacities: Vec<MeshFilter>,
-    /// Per pattern, one triangle that shows it. The filter is asked about that triangle for all of them, so that its data
-    /// is more likely to be in a cache.
+    /// Per pattern, one triangle that shows it. The filter is called with that triangle for all of them, so that its
+    /// data is more likely to be in a cache.
     pub representatives: Vec<Representative>,
     pub maps: MicroMaps,
 }
@@ -55,7 +55,7 @@ pub(crate) struct MeshFilter {
     pub opacity: Arc<dyn Opacity>,
 }
 
-/// A triangle that is asked for all that show the same pattern.
+/// A triangle that filters are called with for all triangles of the same pattern.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Representative {
     /// Its filter, one of [`Filters::opacities`].
@@ -78,13 +78,13 @@ impl Filters {
 }
 
 impl CutoutBlock {
-    /// The part of the map of a lane that tells whether a hit counts, see [`MicroMaps::part`].
+    /// Part of the map of a lane that decides whether a hit counts, see [`MicroMaps::part`].
     #[inline(always)]
     pub fn part(&self, lane: usize, [u, v]: [f32; 2], filters: &Filters) -> usize {
         filters.maps.part(self.maps[lane], u, v)
     }
 
-    /// Asks the filter whether a hit in this lane counts.
+    /// Calls the filter: whether a hit in this lane counts.
     #[inline(never)]
     fn ask(
         &self,
@@ -230,7 +230,7 @@ impl<'a> CutoutHit<'a> {
         }
     }
 
-    /// Whether the hit counts. The filter is asked where the maps do not know.
+    /// Whether the hit counts. The filter is called where the maps do not know.
     #[inline(always)]
     pub fn counts(&self, query: QueryKind, ray: &RaySetup, filters: &Filters) -> bool {
         let [_, u, v] = self.values;
@@ -245,7 +245,7 @@ impl<'a> CutoutHit<'a> {
     }
 
     /// Replaces `best` by this hit if it counts and precedes it, and returns whether it did. The filter costs the most,
-    /// so it is asked last.
+    /// so it is called last.
     #[inline(always)]
     pub fn improves(&self, best: &mut Best, ray: &RaySetup, filters: &Filters) -> bool {
         best.offer_if(self.hit(), || {

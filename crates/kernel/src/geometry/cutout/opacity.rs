@@ -1,4 +1,4 @@
-//! Filters that tell how opaque triangles are, and whether a hit counts.
+//! Filters: how opaque triangles are, and whether a hit counts.
 
 use crate::prim_id::PrimId;
 use core::fmt;
@@ -10,15 +10,14 @@ use crate::hash;
 /// How opaque the triangles of a mesh are, point by point: leaves cut out of rectangles by a mask, or veils
 /// that stop a part of the light.
 ///
-/// A hit counts if `random < opacity`, where `random` in `[0, 1)` is a hash of the ray's origin and direction
-/// (inside an instance, as they are in the object's space), `inst_id`, `geom_id` and `prim_id`. So opacity 1
-/// stops every ray and opacity 0 none, whatever the hash; anything between stops its share of many different
-/// rays, and each ray decides for every triangle anew. The interval of a ray is no part of the hash: a ray is
-/// occluded exactly if one of the pieces is into which it is cut.
+/// A hit counts if `random < opacity`, where `random` in `[0, 1)` is a hash of the ray's origin and direction (inside an
+/// instance, as they are in the object's space), `inst_id`, `geom_id` and `prim_id`. So opacity 1 stops every ray and
+/// opacity 0 none, whatever the hash. Anything between stops its share of many different rays, and the decision is a new
+/// one for each pair of a ray and a triangle. The interval of a ray is no part of the hash: a ray is occluded exactly if
+/// one of the pieces is into which it is cut.
 ///
-/// Must be a pure function: the same candidate has the same opacity whenever it is asked for, on any thread.
-/// Candidates are asked about in no particular order, and only those that may matter for the answer. So answers do not
-/// depend on the tree.
+/// Must be a pure function: the same candidate has the same opacity in every call, on any thread. Calls come in no
+/// particular order, and only for candidates that may matter for the answer. So answers do not depend on the tree.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -62,10 +61,11 @@ pub trait Opacity: fmt::Debug + Send + Sync {
         Coverage::Unknown
     }
 
-    /// Pattern that the triangle `prim_id` shows. Triangles with equal patterns, in whatever mesh or object of one list of primitives
-    /// they are, have the same opacity at the same `(u, v)` for the same instance and query. So one of them is asked for all, by
-    /// [`Opacity::coverage`] and by [`Opacity::opacity`], and the more they are, the closer a look pays. (The `random` of a hit is
-    /// that of the triangle itself.)
+    /// Pattern that the triangle `prim_id` shows. Triangles with equal patterns, in whatever mesh or object of one list
+    /// of primitives they are, have the same opacity at the same `(u, v)` for the same instance and query. So
+    /// [`Opacity::coverage`] and [`Opacity::opacity`] are called with one of them for all. The more triangles share a
+    /// pattern, the more parts its micromap may have. (The `random` of a hit is computed with the ids of the triangle
+    /// that is hit.)
     ///
     /// A thousand leaves cut out of the same corner of the same picture have one pattern. `None`, unless overridden, is always
     /// right: the triangle is not known to be like any other.
@@ -91,7 +91,7 @@ pub trait Opacity: fmt::Debug + Send + Sync {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Pattern(pub [u64; 4]);
 
-/// A point at which a ray meets a triangle of a mesh that has an [`Opacity`].
+/// Hit of a ray on a triangle of a mesh that has an [`Opacity`], before the filter decides whether it counts.
 ///
 /// ```
 /// use antumbra::PrimId;
@@ -115,7 +115,7 @@ pub struct Candidate {
     pub geom_id: u32,
     /// Index of the instance, or [`INVALID_ID`](crate::INVALID_ID).
     pub inst_id: u32,
-    /// Kind of the query that asks.
+    /// Kind of the query that found the candidate.
     pub query: QueryKind,
 }
 
@@ -151,7 +151,7 @@ impl Candidate {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum QueryKind {
-    /// Is anything in the way? Training logs ask this question, too.
+    /// Is anything in the way? Training logs record this query, too.
     Occluded,
     /// Which hit is the closest?
     Intersect,
@@ -189,8 +189,8 @@ pub enum Coverage {
     Unknown,
 }
 
-/// Whether a hit of triangle `id` by this ray counts, by the definition that [`Opacity`] gives. The filter is asked about
-/// the triangle `asked`, which shows the same, and which is one of its own. The pair is `u` and `v`.
+/// Whether a hit of triangle `id` by this ray counts, by the definition that [`Opacity`] gives. The filter is called
+/// with the triangle `asked`, which is one of its own and has the same opacity. The pair is `u` and `v`.
 pub(crate) fn accepts(
     filter: &dyn Opacity,
     asked: PrimRef,

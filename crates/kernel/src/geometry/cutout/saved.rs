@@ -1,4 +1,5 @@
-//! Filters of a tree in files: names of meshes, micromaps, and which triangle is asked about. The functions are given again.
+//! Filters of a tree in files: names of meshes, micromaps, and the representative triangle of each pattern. The
+//! functions are given again.
 
 use super::micromap::MicroMaps;
 use super::{Filters, MeshFilter, Representative};

@@ -1,4 +1,4 @@
-//! Opacity micromaps being made: filters are asked, patterns share.
+//! Making opacity micromaps: coverage is queried once per pattern, and the triangles of a pattern share a micromap.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -9,13 +9,13 @@ use crate::geometry::cutout::opacity::{Coverage, Opacity, Pattern};
 use crate::hash;
 use crate::parallel::map;
 
-/// Triangles whose patterns are asked for at one go.
+/// Least number of triangles whose patterns are queried in one piece.
 const CHUNK: usize = 64;
 
 impl MicroMaps {
-    /// Asks the filters of `count` triangles, and, where they say that a closer look pays, of their parts. `triangle`
-    /// tells the filter of a triangle and its place in its mesh. Also returns what is known of each triangle, and one triangle
-    /// of each pattern that is mixed.
+    /// Makes micromaps of `count` triangles. Per pattern, the coverage of one triangle is queried and, as long as it is
+    /// mixed, the coverage of its parts. `triangle` returns the filter of a triangle and its place in its mesh. Also
+    /// returns what is known of each triangle, and one triangle of each pattern that is mixed.
     pub fn new<'a>(
         count: usize,
         triangle: impl Fn(usize) -> (&'a dyn Opacity, u32) + Sync + Send,
@@ -87,7 +87,7 @@ struct Groups {
 }
 
 impl Groups {
-    /// Triangles of one pattern make a group; each without a pattern is one by itself. Groups stand in the order of their
+    /// Triangles of one pattern make a group; each without a pattern is one by itself. Groups are in the order of their
     /// first triangles.
     fn new(patterns: &[Option<Pattern>]) -> Self {
         let mut groups: Vec<Group> = Vec::new();
@@ -161,7 +161,7 @@ struct Draft {
 }
 
 impl Draft {
-    /// Asks about a triangle and its parts, which have these [`numbers`].
+    /// Queries the coverage of a triangle and of its parts, which have these [`numbers`].
     fn new(filter: &dyn Opacity, prim_id: u32, numbers: &[u16]) -> Self {
         let levels = numbers.len().ilog2() / 2;
         let mut map = Self {
@@ -172,7 +172,7 @@ impl Draft {
         map
     }
 
-    /// Asks about a part, whose smallest parts have these numbers, and about its quarters if that pays.
+    /// Queries the coverage of a part, whose smallest parts have these numbers. If it is mixed, the quarters follow.
     fn ask(
         &mut self,
         filter: &dyn Opacity,

@@ -1,5 +1,5 @@
-//! Opacity micromaps: which parts of a triangle are opaque, clear or unknown. Worked out once, so that the filter need
-//! not be asked where the answer is known.
+//! Opacity micromaps: which parts of a triangle are opaque, clear or unknown. Micromaps are computed once, so that the
+//! filter need not be called where the answer is known.
 //!
 //! Source: Gruen, Benthin and Woop (2020), "Sub-triangle opacity masks for faster ray tracing of transparent objects".
 //! The leaf of a plant, for example, is two triangles around a picture of it. Half of them is clear, and only along the
@@ -10,7 +10,8 @@
 //! is. One of 64 parts takes 16 bytes. One that four times as many triangles share has four times as many parts, so that
 //! finer micromaps never cost more than one of 64 parts for every triangle would.
 //!
-//! - here: micromaps as queries look them up;  `join`: those of several objects;  `make`: micromaps being made;  `parts`: how a triangle is divided
+//! - here: micromaps as queries look them up;  `join`: micromaps of several objects;  `make`: micromaps being made;
+//!   `parts`: how a triangle is divided
 
 use alloc::vec::Vec;
 
@@ -108,7 +109,7 @@ impl MicroMaps {
         64 * map.place() + part_at(map.levels(), u, v)
     }
 
-    /// Asks for the memory of a part.
+    /// Prefetches the bits of a part.
     #[inline(always)]
     pub fn prefetch<S: Simd>(&self, simd: S, part: usize) {
         simd.prefetch(&self.parts[part / 64]);

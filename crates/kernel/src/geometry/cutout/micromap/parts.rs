@@ -38,8 +38,8 @@ pub(super) fn part_around(levels: u32, [[u0, v0], [u1, v1], [u2, v2]]: &[[f32; 2
     part_at(levels, (u0 + u1 + u2) / 3.0, (v0 + v1 + v2) / 3.0)
 }
 
-/// The numbers of the parts of a triangle that is divided so often, in the order in which [`quarters`] come to them: those
-/// of a part that is `levels` divisions away from the smallest stand together, `4^levels` of them.
+/// Numbers of the smallest parts of a triangle that is divided `levels` times, in the order in which [`quarters`] come
+/// to them. The `4^n` smallest parts of a part that is divided `n` more times follow each other.
 pub(super) fn numbers(levels: u32) -> Vec<u16> {
     fn visit(all: u32, levels: u32, corners: &[[f32; 2]; 3], numbers: &mut Vec<u16>) {
         if levels == 0 {

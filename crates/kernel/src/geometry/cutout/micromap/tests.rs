@@ -57,7 +57,7 @@ fn every_point_lies_in_the_part_of_its_number() {
     }
 }
 
-/// A disk. Looked at closely if asked for.
+/// A disk, opaque inside and clear outside. `coverage`, if given, is the answer for every part.
 #[derive(Debug)]
 struct Disk {
     coverage: Option<Coverage>,
