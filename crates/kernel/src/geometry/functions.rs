@@ -14,10 +14,11 @@ use crate::geometry::{Opacity, UserGeometry};
 /// | [filters](Functions::filters) | mesh that was [built with a filter](crate::Geometry::cutouts) |
 /// | [shapes](Functions::shapes) | [user geometry](crate::Geometry::user) of which the tree has a primitive |
 ///
-/// Both lists go by [`GeometryId`]: the geometries of the world itself by their `geom_id`, then the geometries of object 0, of
-/// object 1 and so on. A list that is too short or too long is [`Error::OtherFunctions`], which names all geometries of the
-/// list. Whether a function is the one of the build cannot be checked: another one gives other answers. Functions are asked
-/// about the `prim_id`s of the file. If somebody else may have written it, they must not trust those.
+/// Both lists go by [`GeometryId`]: the geometries of the world itself by their `geom_id`, then the geometries of object
+/// 0, of object 1 and so on. A list that is too short or too long is [`Error::OtherFunctions`], which names all
+/// geometries of the list. Whether a function is the one of the build cannot be checked: another one gives other
+/// answers. Functions are called with the `prim_id`s of the file. They must not trust these if somebody else may have
+/// written the file.
 ///
 /// Opacity micromaps and the boxes of user geometry come from the file. No filter is called while a file is read, and of a shape
 /// only what queries call.

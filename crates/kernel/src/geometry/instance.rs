@@ -94,7 +94,7 @@ impl Affine {
         })
     }
 
-    /// The inverse; `None` unless there is one, as far as double precision can tell.
+    /// The inverse; `None` unless there is one, as far as double precision can distinguish.
     pub fn inverse(&self) -> Option<Self> {
         /// Well above the rounding of a determinant relative to the product of the lengths of the rows.
         const SINGULAR: f64 = 1e-14;
@@ -185,8 +185,8 @@ pub(crate) struct PlacedObject {
 /// Where the primitives of an object are: boxes around groups of them. Turned, they fill less than one turned
 /// box around them all does.
 ///
-/// A function of the primitives alone: what is around an instance decides what it is hit by, and that must
-/// not depend on any tree.
+/// A function of the primitives only: what is around an instance decides what it is hit by, and that must not depend on
+/// any tree.
 #[derive(Clone, Debug)]
 pub(crate) struct ObjectShape {
     boxes: Vec<Aabb>,
@@ -204,7 +204,7 @@ const GROUPS: usize = 8;
 /// Points that are looked at together.
 const LANES: usize = 8;
 
-/// Coordinates of points per axis, a whole number of [`LANES`] of them: the last point may stand there several times.
+/// Coordinates of points per axis, a whole number of [`LANES`] of them: the last point may be repeated to fill it.
 type Points = [Vec<f64>; 3];
 
 impl ObjectShape {

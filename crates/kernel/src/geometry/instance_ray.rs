@@ -23,8 +23,8 @@ impl Interval {
         leave: f32::INFINITY,
     };
 
-    /// The interval in the box of an instance or a sphere, widened; `None` unless the interval shares a point with
-    /// that of the ray, which is open. No fused operations: the same bits on every level.
+    /// The interval in the box of an instance or a sphere, widened; `None` unless it shares a point with the interval of
+    /// the ray, which is open. No fused operations: the same bits on every level.
     #[inline(always)]
     pub fn of<S: Simd>(simd: S, world: &RaySetup, [low, high]: &[[f32; 4]; 2]) -> Option<Self> {
         type Vector<S> = <S as Width<4>>::Lanes;
@@ -53,10 +53,10 @@ impl Interval {
 }
 
 impl Placement {
-    /// Makes `object` the setup of the ray in the object, and tells where it is in the box; `None` if it misses
-    /// the box, or if the object brings it out of the range of `f32`; then `object` is not to be traced.
+    /// Makes `object` the setup of the ray in the object, and returns the interval of the ray in the box; `None` if it
+    /// misses the box, or if the object brings it out of the range of `f32`; then `object` is not to be traced.
     ///
-    /// Distances interval what they are, because the direction keeps its length. The same bits on every level.
+    /// Distances keep their meaning, because the direction keeps its length. The same bits on every level.
     #[inline(always)]
     pub fn enter<S: Simd>(
         &self,

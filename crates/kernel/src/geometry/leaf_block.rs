@@ -56,7 +56,7 @@ pub(crate) trait LeafBlock: Clone + Send + Sync {
     /// Puts the primitive of lane `lanes[i]` into lane `i`.
     fn permute(&mut self, lanes: &[u8; BLOCK]);
 
-    /// Asks for the memory that [`LeafBlock::fill`] reads of a primitive.
+    /// Prefetches what [`LeafBlock::fill`] reads of a primitive.
     fn prefetch(_primitives: &Primitives, _prim: u32) {}
 
     /// The lanes that may be hit no farther than `limit`, which is at most the end of the ray. In a ray stream (`STREAM`)

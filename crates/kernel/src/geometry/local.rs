@@ -1,5 +1,5 @@
-//! Coordinates in double precision: maps, planets and building sites lie so far from their origin that single
-//! precision cannot tell neighbouring points apart. Moved to an origin of their own, it can.
+//! Coordinates in double precision: maps, planets and building sites lie so far from their origin that neighbouring
+//! points are equal in single precision. Moved to an origin of their own, they are distinct.
 
 use alloc::borrow::Cow;
 use alloc::vec::Vec;
@@ -81,8 +81,8 @@ impl LocalOrigin {
 }
 
 impl<'a> Geometry<'a> {
-    /// A triangle mesh of points in double precision, seen from `local`. Hits and their ids are those of any mesh;
-    /// the same origin must be used for the rays.
+    /// A triangle mesh of points in double precision, seen from `local`. Hits and their ids are the same as for any
+    /// mesh; the same origin must be used for the rays.
     pub fn triangles_f64(
         positions: &[[f64; 3]],
         indices: impl Into<Cow<'a, [[u32; 3]]>>,

@@ -9,8 +9,8 @@
 //! - `quad`: pairs of triangles that are one primitive
 //! - `scalar`: kinds that are tested one by one: `sphere`, `disk`, `curve`, segments of thin curves, and `user`, primitives of
 //!   which users give boxes and functions;  `cubic`: cubic curves as segments
-//! - `cutout`: leaves of partly transparent triangles; in it `opacity`, the filters of users, and `micromap`, which
-//!   tells where no filter need be asked
+//! - `cutout`: leaves of partly transparent triangles; in it `opacity`, the filters of users, and `micromap`, parts of
+//!   triangles for which no filter need be called
 //! - `instance`: objects placed in the world;  `nested`: objects in objects;  `instance_ray`: a ray in an object;
 //!   `ray_setup`: a ray made ready;  `slab_test`: boxes
 //! - `best`: the best hit so far
@@ -91,7 +91,7 @@ pub struct TriangleMesh<'a> {
     pub positions: Cow<'a, [[f32; 3]]>,
     /// Three indices into `positions` per triangle, `[m, 3]`; the place in this list is the `prim_id`.
     pub indices: Cow<'a, [[u32; 3]]>,
-    /// Filter that tells how opaque the triangles are. Without one all of them are opaque.
+    /// Filter that returns how opaque the triangles are. Without one all of them are opaque.
     pub opacity: Option<Arc<dyn Opacity>>,
 }
 
@@ -112,17 +112,17 @@ impl<'a> TriangleMesh<'a> {
 
 /// An indexed mesh of quads, owned or borrowed.
 ///
-/// A quad with the corners 0, 1, 2, 3 is the two triangles (0, 1, 3) and (2, 3, 1), as in Embree. They have one `prim_id`,
-/// and fit without a gap. Corners may lie in one plane or not. In a quad whose third corner is the fourth as well, as
-/// files have them for triangles, there is the first triangle alone.
+/// A quad with the corners 0, 1, 2, 3 is the two triangles (0, 1, 3) and (2, 3, 1), as in Embree. They have one
+/// `prim_id`, and fit without a gap. Corners may lie in one plane or not. In a quad whose third corner is the fourth as
+/// well, as files have them for triangles, there is only the first triangle.
 ///
-/// `u` and `v` of a hit are those of the whole quad: 0 and 0 at corner 0, 1 and 0 at corner 1, 1 and 1 at corner 2, 0 and 1 at
-/// corner 3. On the first triangle they are its barycentrics, on the second one 1 less its barycentrics.
+/// `u` and `v` of a hit are coordinates in the whole quad: 0 and 0 at corner 0, 1 and 0 at corner 1, 1 and 1 at corner
+/// 2, 0 and 1 at corner 3. On the first triangle they are its barycentrics, on the second one 1 less its barycentrics.
 ///
 /// There are no filters for quads: a [filter of the query](crate::RayQuery::filter) can decide, or give triangles.
 ///
-/// Each triangle of a quad is hit by itself: [`RayQuery::visit_hits`](crate::RayQuery::visit_hits) reports a quad twice if a ray meets both,
-/// on the diagonal or because the quad is not flat.
+/// Each triangle of a quad is hit by itself: [`RayQuery::visit_hits`](crate::RayQuery::visit_hits) reports a quad twice
+/// if a ray hits both, on the diagonal or because the quad is not flat.
 ///
 /// Dropped at build are quads with a NaN or infinite coordinate and quads of which both triangles have two equal corners. An
 /// index beyond the positions is an error at build.

@@ -1,7 +1,7 @@
 //! Geometry whose vertices moved, for a tree that keeps its shape.
 //!
-//! A refit must answer like a tree built anew. So the same primitives must be sound before and after, which is checked
-//! before anything is changed.
+//! A refit must answer like a tree built from scratch. So the same primitives must be sound before and after, which is
+//! checked before anything is changed.
 
 use crate::error::Error;
 use crate::geometry::leaf_block::LeafBlock;

@@ -1,7 +1,7 @@
 //! How far a point is from a primitive, and where the primitive is nearest: what answers queries about points.
 //!
 //! Corners are `f32`, all arithmetic is `f64`, in the world: corners in an instance are placed first. So an answer is a
-//! function of the point, the primitive and the transform alone, and no tree can change a bit of it.
+//! function of the point, the primitive and the transform only, and no tree can change a bit of it.
 
 use crate::geometry::Sphere;
 use crate::geometry::instance::{Affine, dot};
@@ -16,7 +16,7 @@ pub(crate) struct Near {
     pub uv: [f64; 2],
 }
 
-/// Where a point is asked about, and how an object is placed there.
+/// Point of a query, and how an object is placed there.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place<'a> {
     /// In the world.
@@ -138,8 +138,9 @@ fn on_sphere(point: [f64; 3], radius: f64) -> [f64; 3] {
 
 /// The nearest point to `point` on the image of a sphere around the origin under a linear map `A`.
 ///
-/// The least `|A x - point|` with `|x| = radius` solves `(A' A + l) x = A' point` for the largest `l` that gives `x` this
-/// length. In the basis of eigenvectors of `A' A` that is an equation for `l` alone, found by bisection.
+/// The least `|A x - point|` with `|x| = radius` solves `(A' A + l) x = A' point` for the largest `l` that gives `x`
+/// this length. In the basis of eigenvectors of `A' A` that is an equation for the single unknown `l`, found by
+/// bisection.
 fn on_ellipsoid(affine: &Affine, point: [f64; 3], radius: f64) -> [f64; 3] {
     let columns: [[f64; 3]; 3] =
         core::array::from_fn(|column| core::array::from_fn(|row| affine.rows[row][column]));

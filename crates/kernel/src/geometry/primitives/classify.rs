@@ -1,4 +1,4 @@
-//! Second stage: filters are asked which triangles are opaque, clear or partly transparent.
+//! Second stage: filters decide which triangles are opaque, clear or partly transparent.
 
 use alloc::sync::Arc;
 use alloc::vec::Vec;
@@ -9,8 +9,8 @@ use super::{OwnCutout, Primitives};
 use crate::geometry::cutout::micromap::{Known, MicroMaps};
 use crate::geometry::cutout::{Filters, MeshFilter, Representative};
 
-/// Classifies the triangles of several lists, which have these filters. All are asked about together, because they
-/// may show the same.
+/// Classifies the triangles of several lists, which have these filters. All go together, because triangles of different
+/// lists may have the same pattern.
 pub(super) fn classified(
     lists: Vec<Copied>,
     opacities: Vec<MeshFilter>,

@@ -263,7 +263,7 @@ impl Primitives {
         }
     }
 
-    /// Knowledge of a partly transparent triangle without asking its filter.
+    /// Knowledge of a partly transparent triangle that needs no call of its filter.
     pub(crate) fn cutout(&self, index: usize) -> Cutout {
         self.own_cutout(index).known
     }
@@ -313,7 +313,7 @@ impl Primitives {
 /// A partly transparent triangle, apart from its corners.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OwnCutout {
-    /// Its own filter, one of [`crate::geometry::cutout::Filters::opacities`]: asked where no tree is used.
+    /// Its own filter, one of [`crate::geometry::cutout::Filters::opacities`]: called where no tree is used.
     pub filter: u32,
     pub known: Cutout,
 }
