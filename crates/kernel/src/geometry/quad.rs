@@ -1,9 +1,10 @@
 //! Quads: pairs of triangles with the number of the quad.
 //!
 //! A quad with corners 0, 1, 2, 3 is the triangles (0, 1, 3) and (2, 3, 1), as in Embree. Everything from the copy of a
-//! geometry to the test of a leaf knows triangles alone. What tells them from others is their number: the upper bit is
-//! set, the lowest one says which half it is, and the bits between are the number of the quad. No other primitive has a
-//! number that large, and numbers of quads compare like quads. Where a hit leaves the kernel, it becomes one on the quad.
+//! geometry to the test of a leaf knows only triangles. The number of a half distinguishes it from other triangles: the
+//! upper bit is set, the lowest one says which half it is, and the bits between are the number of the quad. No other
+//! primitive has a number that large, and numbers of quads compare like quads. Where a hit leaves the kernel, it becomes
+//! one on the quad.
 
 use crate::geometry::PrimRef;
 use crate::geometry::primitives::dropped::DropReason;

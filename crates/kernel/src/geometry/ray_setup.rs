@@ -17,28 +17,29 @@
 //!   evaluating the slab `4.2 u R`, fused or not. All of it is less than the margin. So every node above a triangle that is
 //!   hit is entered at `t` or before, and left at `t` or later: no tree, width, order or level can lose it. The same
 //!   holds for every box around a part of the triangle with `P` in it.
-//! - *Sphere, user geometry*: the distance is worked out from the sphere, or told by the user, and then *defined* to be
-//!   clamped into the interval of the primitive's own box, whose plane distances are widened by `16 u R`. Node boxes hold that box, the same formula is monotonic
-//!   in the planes, and the difference of the margins, `16 u R`, is more than all roundings of the two evaluations
-//!   (`8.3 u R`). So a node above it is entered at or before the hit, again.
+//! - *Sphere, user geometry*: the distance is computed from the sphere, or returned by the user's function, and then
+//!   *defined* to be clamped into the interval of the primitive's own box, whose plane distances are widened by
+//!   `16 u R`. Node boxes hold that box, the same formula is monotonic in the planes, and the difference of the margins,
+//!   `16 u R`, is more than all roundings of the two evaluations (`8.3 u R`). So a node above it is entered at or before
+//!   the hit, again.
 //!
 //! Rays for which a product might overflow, or the margins underflow, are traced without culling, and nothing is clamped.
 //!
 //! # Why no tree decides what is hit in an instance
 //!
-//! An instance is entered by a ray made ready for its object: origin and direction are transformed without
-//! fused operations and the direction keeps its length, so distances mean the same in both spaces. Within
-//! the object all of the above holds, so what is hit there, and at which `t`, follows from the transformed
-//! ray and the primitive alone. What remains is how the two spaces fit together, because rounding may place
-//! a hit outside of the boxes that lead to it in the world. Hence these definitions:
+//! An instance is entered by a ray made ready for its object: origin and direction are transformed without fused
+//! operations and the direction keeps its length, so distances mean the same in both spaces. Within the object all of
+//! the above holds, so what is hit there, and at which `t`, follows from nothing but the transformed ray and the
+//! primitive. What remains is how the two spaces fit together, because rounding may place a hit outside of the boxes
+//! that lead to it in the world. Hence these definitions:
 //!
-//! - The *instance interval* of a ray is the part of it inside the instance's box in the world, widened by `16 u R` as
-//!   that of a sphere. The box follows from the primitives and the transform (see
+//! - The *instance interval* of a ray is the part of it inside the instance's box in the world, widened by `16 u R` like
+//!   the interval of a sphere. The box follows from the primitives and the transform (see
 //!   [`crate::geometry::instance`]). The instance is missed unless the instance interval shares a point with the open
 //!   interval of the ray.
 //! - A hit in the object at `t` is reported at `t` clamped into the instance interval. The clamped distance lies in the
-//!   interval of the ray, because `t` does and both intervals meet. Hits are ranked by the distances reported, then by
-//!   ids.
+//!   interval of the ray, because `t` does and both intervals share a point. Hits are ranked by the distances reported,
+//!   then by ids.
 //!
 //! In the world the box of the instance takes the place of a sphere's: every node above it is entered
 //! at or before the instance interval, so no tree can lose the instance, nor, among closest hits, one that is reported
@@ -51,11 +52,12 @@
 //!
 //! An occlusion query need not clamp: see the second definition.
 //!
-//! # What vectors in single precision can tell
+//! # What vectors in single precision can decide
 //!
-//! Vectors work out edge functions `e` of the sheared corners in single precision, their sum `D`, distances `tᵢ` of the
+//! Vectors compute edge functions `e` of the sheared corners in single precision, their sum `D`, distances `tᵢ` of the
 //! corners, and `T`, the sum of `e tᵢ`. Rounding is monotonic, so an edge function that is not zero has the sign of the
-//! exact one, `E`, and edge functions of both signs are a miss. Let all be of one sign, and more than [`SMALL`] by magnitude.
+//! exact one, `E`, and edge functions of both signs are a miss. Let all be of one sign, and more than [`SMALL`] by
+//! magnitude.
 //!
 //! Let `S` be the product of the largest sheared coordinates on the first two axes, by magnitude, `m` the largest `tᵢ` by
 //! magnitude, and `t` the distance as defined. An edge function is a difference of two products of at most `S`, so it is
@@ -67,12 +69,12 @@
 //! distance of the best hit so far. The excess is for the roundings of the comparison and of `D`, which are at most
 //! `6 u m D` where that end is within `2 m`, and a few `u` of the difference itself where it is not. So a lane whose
 //! differences both exceed the doubt is surely hit, and a lane with a difference less than the negative doubt surely is
-//! not. Few lanes are left to be worked out as defined. The triangle that a ray starts from is seldom one, because `m` is
+//! not. Few lanes are left to be computed as defined. The triangle that a ray starts from is seldom one, because `m` is
 //! small there.
 //!
-//! Nothing overflows while `R` and `R / w` are within [`SANE`]; beyond, every lane is worked out. What underflows in `e` is
-//! nothing beside [`SMALL`]. What underflows in `tᵢ` or `T` is less than [`SLACK`], which the doubt has in addition: a unit
-//! is `2⁻¹⁵⁰`, and `D` at most `2⁸³`.
+//! Nothing overflows while `R` and `R / w` are within [`SANE`]; beyond, every lane is computed as defined. What
+//! underflows in `e` is nothing beside [`SMALL`]. What underflows in `tᵢ` or `T` is less than [`SLACK`], which the doubt
+//! has in addition: a unit is `2⁻¹⁵⁰`, and `D` at most `2⁸³`.
 
 use core::ops::Deref;
 
@@ -325,7 +327,8 @@ impl RaySetup {
         true
     }
 
-    /// Corrects the set-up for lengths that are not [`SANE`] and intervals that begin at -∞. `margin` is that of nodes in units of `t`.
+    /// Corrects the set-up for lengths that are not [`SANE`] and intervals that begin at -∞. `margin` is the margin of
+    /// node boxes, in units of `t`.
     #[cold]
     #[inline(never)]
     fn set_extreme(&mut self, margin: f32) {

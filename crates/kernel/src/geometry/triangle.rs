@@ -1,7 +1,7 @@
 //! Triangles of a leaf, tested together.
 //!
-//! What a hit is says [`crate::geometry::triangle_hit`]. Vectors decide nearly all lanes, see
-//! [`crate::geometry::edge_test`]; what is in doubt, and the distance of a closest hit, is worked out as defined.
+//! The definition of a hit is in [`crate::geometry::triangle_hit`]. Vectors decide nearly all lanes, see
+//! [`crate::geometry::edge_test`]; lanes in doubt, and the distance of a closest hit, are computed as defined.
 
 use antumbra_simd::{Lanes, Mask, Scalar, Simd, Width};
 

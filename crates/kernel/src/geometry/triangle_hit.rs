@@ -1,11 +1,11 @@
 //! The definition of a hit on a triangle: one ray, one triangle, in plain scalar code that every level shares.
 //!
-//! The corners are translated to the ray's origin and sheared so that the ray runs along z (Woop, Benthin and Wald
-//! 2013, "Watertight Ray/Triangle Intersection", JCGT 2(1)), in single precision. All that follows is in double
-//! precision, where products of single precision are exact. So the signs of the edge functions are those of the sheared
-//! corners, and triangles that share an edge or a corner see the same ones. Zero counts as inside, on both sides. The
-//! distance is a mean of the corners' distances with weights of one sign, and is rounded once at the end: thin triangles are
-//! told as exactly as others, and a ray inside a closed mesh hits it, however thin the mesh is.
+//! The corners are translated to the ray's origin and sheared so that the ray runs along z (Woop, Benthin and Wald 2013,
+//! "Watertight Ray/Triangle Intersection", JCGT 2(1)), in single precision. All that follows is in double precision,
+//! where products of single precision are exact. So the edge functions have the exact signs for the sheared corners, and
+//! triangles that share an edge or a corner see the same ones. Zero counts as inside, on both sides. The distance is a
+//! mean of the corners' distances with weights of one sign, and is rounded once at the end: hits on thin triangles are
+//! as exact as others, and a ray inside a closed mesh hits it, however thin the mesh is.
 //!
 //! What vectors can say sooner is in [`crate::geometry::edge_test`], why no tree loses a hit in
 //! [`crate::geometry::ray_setup`].
@@ -63,8 +63,8 @@ impl ShearedTriangle {
         (inside & (ray.tnear < t) & (t < ray.tfar)).then_some(t)
     }
 
-    /// The barycentrics `u` and `v` of the hit: those of single precision, which vectors work out alike, where there are
-    /// any.
+    /// The barycentrics `u` and `v` of the hit, in single precision, where vectors compute the same bits. In double
+    /// precision if that gives none.
     #[inline(always)]
     pub fn barycentrics(&self) -> [f32; 2] {
         let ([ax, bx, cx], [ay, by, cy]) = (self.x, self.y);
@@ -140,7 +140,7 @@ mod tests {
     use antumbra_simd::{Mask, Scalar};
     use antumbra_testkit::Rng;
 
-    /// Few coordinates, so that rays often meet edges and corners.
+    /// Few coordinates, so that rays often hit edges and corners.
     #[test]
     fn vectors_say_the_same() {
         type Four = <Scalar as antumbra_simd::Width<4>>::Lanes;

@@ -1,8 +1,9 @@
 //! User geometry: primitives of which users give boxes and functions. Bounds and test.
 //!
-//! Answers must not depend on a tree, whatever the functions return. So every function is asked with the whole interval of
-//! the ray, never with one cut off at the best hit so far. And what it returns counts only where the ray is in the box that
-//! the user gave: distances are clamped into that interval as those of spheres, see [`crate::geometry::ray_setup`].
+//! Answers must not depend on a tree, whatever the functions return. So every function is called with the whole interval
+//! of the ray, never with one cut off at the best hit so far. And what it returns counts only where the ray is in the
+//! box that the user gave: distances are clamped into that interval like distances to spheres, see
+//! [`crate::geometry::ray_setup`].
 
 use alloc::sync::Arc;
 use core::fmt;
@@ -16,17 +17,18 @@ use crate::geometry::scalar::{ScalarPrim, ScalarShape, SurfacePoint, interval_in
 use crate::hash::Random;
 use crate::ray::{Hit, Ray};
 
-/// Geometry of your own: boxes, and functions that tell where rays hit.
+/// Geometry of your own: boxes, and functions that return where rays hit.
 ///
-/// One value stands for all primitives of a geometry, and the functions are told which one is asked about. Trees keep the
-/// `Arc` that [`Geometry::user`](crate::Geometry::user) was given, and no copy of your data.
+/// One value stands for all primitives of a geometry, and the functions receive the number of the primitive. Trees keep
+/// the `Arc` that [`Geometry::user`](crate::Geometry::user) was given, and no copy of your data.
 ///
 /// # What holds
-/// - Functions must be deterministic: the same primitive and ray have the same answer, whenever and on whatever thread they
-///   are asked. Then answers are the same bits for every tree, and those of [`Brute`](crate::Brute).
+/// - Functions must be deterministic: the same primitive and ray have the same answer in every call, on any thread. Then
+///   answers are the same bits for every tree and for [`Brute`](crate::Brute).
 /// - Rays come in the space of the geometry: inside an instance they are in the space of the object. `t` means the same
 ///   there. The interval is always the whole one of the query.
-/// - A function is called only where the ray's interval meets the box of the primitive. The order of calls is not defined.
+/// - A function is called only where the ray's interval overlaps the box of the primitive. The order of calls is not
+///   defined.
 /// - A hit counts if `tnear < t < tfar`. Any other, and one whose `t` is NaN, is as good as none.
 /// - The ray must be in the box at `t`. A distance outside of it is moved to the nearer end of the part of the ray that is
 ///   inside, so boxes must be large enough.
@@ -61,14 +63,14 @@ use crate::ray::{Hit, Ray};
 /// # Ok::<(), antumbra::Error>(())
 /// ```
 pub trait UserGeometry: fmt::Debug + Send + Sync {
-    /// Box around a primitive. Asked once when the geometry is checked, and again in a refit. A primitive is dropped if
+    /// Box around a primitive. Called once when the geometry is checked, and again in a refit. A primitive is dropped if
     /// its box has a NaN or infinite number, or is empty. A flat box is fine.
     fn bounds(&self, prim_id: u32) -> Aabb;
 
     /// Hit of a ray on a primitive: the closest one in the interval of the ray, if there are several.
     fn intersect(&self, prim_id: u32, ray: &Ray) -> Option<UserHit>;
 
-    /// Whether a primitive occludes a ray. Must tell what [`UserGeometry::intersect`] tells, and may be faster.
+    /// Whether a primitive occludes a ray. Must agree with [`UserGeometry::intersect`], and may be faster.
     fn occluded(&self, prim_id: u32, ray: &Ray) -> bool {
         let hit = self.intersect(prim_id, ray);
         hit.is_some_and(|hit| ray.tnear < hit.t && hit.t < ray.tfar)
@@ -123,8 +125,8 @@ pub trait UserGeometry: fmt::Debug + Send + Sync {
         );
     }
 
-    /// Geometric normal at a hit, of any length, in the space of the ray. [`Bvh::normal`](crate::Bvh::normal) asks, and has
-    /// none for these primitives if this is `None`.
+    /// Geometric normal at a hit, of any length, in the space of the ray. [`Bvh::normal`](crate::Bvh::normal) calls this
+    /// function, and returns `None` for these primitives if this does.
     fn normal(&self, _prim_id: u32, _ray: &Ray, _hit: &UserHit) -> Option<[f32; 3]> {
         None
     }
@@ -173,7 +175,7 @@ pub(crate) struct UserPrim {
 }
 
 impl UserPrim {
-    /// Asks for the box of a primitive.
+    /// Queries the box of a primitive.
     fn new(shape: &Arc<dyn UserGeometry>, prim_id: u32) -> Result<Self, DropReason> {
         let bounds = shape.bounds(prim_id);
         if !is_finite_box(&bounds) {

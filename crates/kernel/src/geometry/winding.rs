@@ -2,9 +2,9 @@
 //!
 //! The winding number is the signed number of crossings of a half-line from the point along the x axis. Half-lines
 //! through edges and corners are what makes such counts fragile. Here each side of a triangle is judged by itself, seen
-//! along x, by a half-open rule on y and one sign that is worked out from its lower end to its upper end, whichever
-//! triangle asks. Two triangles that share a side therefore judge it alike, rounded or not, and a half-line crosses
-//! a closed surface next to an edge exactly once. (Rounding can only matter to points within some `2⁻⁵⁰` of the
+//! along x, by a half-open rule on y and one sign that is computed from its lower end to its upper end, whichever
+//! triangle it belongs to. Two triangles that share a side therefore judge it alike, rounded or not, and a half-line
+//! crosses a closed surface next to an edge exactly once. (Rounding can only matter to points within some `2⁻⁵⁰` of the
 //! size of a triangle from its surface.)
 
 use crate::geometry::instance::{cross, dot};

@@ -3,10 +3,11 @@
 //! Geometries become primitives in three stages, each with a file and a type of its own:
 //!
 //! - `copy`: geometries are checked and copied, what is unsound is dropped
-//! - `classify`: filters are asked which triangles are opaque, clear or partly transparent
+//! - `classify`: filters decide which triangles are opaque, clear or partly transparent
 //! - `place`: objects are placed in the world
 //!
-//! `dropped` tells what was left out on the way. `kinds` is the list of kinds. It numbers the result, kind after kind, and tests single primitives.
+//! `dropped` lists what was left out on the way, and why. `kinds` is the list of kinds. It numbers the result, kind
+//! after kind, and tests single primitives.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -121,8 +122,8 @@ impl Primitives {
         Ok(primitives)
     }
 
-    /// Number of primitives in the world itself, without dropped ones and without those of objects. A quad counts as the
-    /// triangles it has: two, or one.
+    /// Number of primitives in the world itself, without dropped ones and without primitives of objects. A quad counts
+    /// as the triangles it has: two, or one.
     pub fn len(&self) -> usize {
         self.triangles.len() + self.scalars.lens().iter().sum::<usize>()
     }
@@ -163,19 +164,19 @@ impl Primitives {
         &self.dropped
     }
 
-    /// Number of partly transparent triangles; those of an object count once.
+    /// Number of partly transparent triangles. A triangle of an object counts once.
     pub fn cutouts(&self) -> usize {
         let of_objects = self.objects.iter().map(Self::cutouts);
         self.cutouts.len() + of_objects.sum::<usize>()
     }
 
-    /// Number of primitives of user geometry; those of an object count once.
+    /// Number of primitives of user geometry. A primitive of an object counts once.
     pub fn users(&self) -> usize {
         let of_objects = self.objects.iter().map(Self::users);
         self.scalars.users.len() + of_objects.sum::<usize>()
     }
 
-    /// Number of triangles that were left out because they are clear; those of an object count once.
+    /// Number of triangles that were left out because they are clear. A triangle of an object counts once.
     pub fn transparent(&self) -> usize {
         let of_objects = self.objects.iter().map(Self::transparent);
         self.transparent + of_objects.sum::<usize>()

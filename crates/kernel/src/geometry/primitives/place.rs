@@ -13,7 +13,7 @@ use crate::parallel::map;
 /// Instances that leaf references can name: two of their 2²⁹ values have another meaning.
 pub(crate) const MAX_INSTANCES: usize = (1 << 29) - 2;
 
-/// Which of the objects some instance asks for.
+/// Which of `objects` objects some instance places.
 ///
 /// # Errors
 /// Too many instances; an index of an object out of range.
