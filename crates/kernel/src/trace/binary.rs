@@ -17,7 +17,7 @@ use crate::geometry::triangle::TriangleBlock;
 use crate::ray::Ray;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 
-/// Receives what rays meet in one tree, that of the world or of an object, one ray after the other.
+/// Receives the nodes and hits of rays in one tree, the tree of the world or of an object, one ray after the other.
 pub(crate) trait Witness {
     /// A ray, made ready for this tree, begins. Returns whether it is to be followed.
     fn begin(&mut self, ray: &RaySetup) -> bool;
@@ -154,8 +154,8 @@ impl<'a, W: Witness> Follower<'a, W> {
         }
     }
 
-    /// Tells the witness what one ray meets in the tree, which has at least one node. Returns whether the ray hits
-    /// anything.
+    /// Follows one ray through the tree, which has at least one node, and reports its nodes and hits to the witness.
+    /// Returns whether the ray hits anything.
     #[inline(always)]
     fn follow<S: Simd>(&mut self, simd: S, setup: &RaySetup, below: &mut impl Below) -> bool {
         let Self {
@@ -240,8 +240,8 @@ fn prim_hits(
 /// Blocks kept at a time, some megabytes. Rays through coincident triangles come to all leaves of a scene.
 const MAX_BLOCKS: usize = 1 << 14;
 
-/// Blocks of the leaves of triangles, opaque or not, that some ray has come to: rays that follow each other meet
-/// much the same ones, and few rays meet but a small part of a large scene.
+/// Blocks of the leaves of triangles, opaque or not, that some ray has come to. Rays that follow each other visit much
+/// the same leaves, and most rays visit only a small part of a large scene.
 struct Blocks<'a> {
     primitives: &'a Primitives,
     tree: &'a BinaryTree,

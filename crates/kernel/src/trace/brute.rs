@@ -105,7 +105,7 @@ impl Brute {
         hits
     }
 
-    /// Whether anything that meets a condition occludes a ray.
+    /// Whether any hit that fulfils a condition occludes a ray.
     pub(crate) fn occluded_when(&self, ray: &Ray, condition: &Condition<'_>) -> bool {
         let Some(world) = RaySetup::new(ray, self.reach) else {
             return false;

@@ -17,7 +17,7 @@ use crate::tree::leaves::on_leaf;
 use crate::tree::node::{Child, Leaf};
 use crate::tree::wide::WideTree;
 
-/// The closest hit that meets a condition, with its leaf. `stack` is memory of one for this tree.
+/// The closest hit that fulfils a condition, with its leaf. `stack` is memory of one for this tree.
 pub(crate) fn closest_with_leaf<const N: usize>(
     bvh: &WideTree<N>,
     stack: &mut [u64],

@@ -4,7 +4,7 @@ use crate::geometry::masks::SceneMasks;
 use crate::prim_id::PrimId;
 use crate::ray::Hit;
 
-/// What a query asks of a hit beside its place in the interval. Ids are as users know them.
+/// Conditions of a query on a hit beside its place in the interval. Ids are as users know them.
 #[derive(Clone, Copy)]
 pub(crate) struct Condition<'a> {
     /// A primitive that is left out, or [`PrimId::NONE`].
@@ -115,7 +115,8 @@ impl<'a> Condition<'a> {
         }
     }
 
-    /// Whether a hit with ids as in the tree comes after the one behind which hits count, in the order in which hits are told.
+    /// Whether a hit with ids as in the tree comes after the one behind which hits count, in the order in which hits are
+    /// reported.
     pub fn is_behind(&self, hit: &Hit) -> bool {
         self.after.is_none_or(|after| after.precedes(hit))
     }

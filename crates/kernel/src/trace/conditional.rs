@@ -1,5 +1,5 @@
-//! Occlusion of a ray by what meets a condition: anything but the primitive the ray starts on, what its mask shows, what a
-//! function of the user accepts.
+//! Occlusion of a ray by hits that fulfil a condition: anything but the primitive the ray starts on, what its mask
+//! shows, what a function of the user accepts.
 //!
 //! Conditions other than a primitive that is left out are decided lane by lane, in code that is compiled once.
 
@@ -23,7 +23,8 @@ use crate::tree::leaves::on_leaf;
 use crate::tree::node::Leaf;
 use crate::tree::wide::WideTree;
 
-/// What occludes a ray of all that meets a condition: the first that is found, which depends on the tree.
+/// Occlusion of a ray by hits that fulfil a condition. The occluder is the first that is found, which depends on the
+/// tree.
 pub(crate) struct Conditional<'a, const N: usize> {
     pub bvh: &'a WideTree<N>,
     /// Memory of a stack for this tree.
@@ -55,8 +56,8 @@ impl<const N: usize> WithSimd<N> for Conditional<'_, N> {
     }
 }
 
-/// The first of these lanes of a leaf that occludes a ray and meets a condition. `interval` is that of the instance where
-/// the ray is.
+/// The first of these lanes of a leaf that occludes a ray and fulfils a condition. `interval` is the interval of the
+/// instance where the ray is.
 #[inline(never)]
 pub(crate) fn occluder_when<const N: usize>(
     bvh: &WideTree<N>,
@@ -74,8 +75,8 @@ pub(crate) fn occluder_when<const N: usize>(
     on_leaf!(bvh, leaf, block => known.first(block, LanesOf(lanes), ray, &bvh.filters))
 }
 
-/// Replaces `best` by the closest hit in these lanes of a leaf that meets a condition, where that precedes it, and returns
-/// whether it did.
+/// Replaces `best` by the closest hit in these lanes of a leaf that fulfils a condition, where that precedes it, and
+/// returns whether it did.
 #[inline(never)]
 pub(crate) fn improve_when<const N: usize>(
     bvh: &WideTree<N>,
@@ -134,14 +135,14 @@ pub(crate) fn reported(hit: Hit, ray: &RaySetup, interval: Interval) -> Hit {
     hit.told()
 }
 
-/// [Occlusion](crate::trace::query::Occlusion) by what meets a condition.
+/// [Occlusion](crate::trace::query::Occlusion) by hits that fulfil a condition.
 struct OcclusionIf<'a>(core::marker::PhantomData<&'a ()>);
 
 /// Knowledge of a ray on its way.
 #[derive(Clone, Copy)]
 struct Known<'a> {
     excluded: PrimId,
-    /// The whole condition, if it asks for anything else.
+    /// The whole condition, if there is more to it than the excluded primitive.
     more: Option<&'a Condition<'a>>,
     /// Where hits are reported: the instance interval.
     interval: Interval,

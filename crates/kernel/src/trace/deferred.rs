@@ -62,7 +62,8 @@ impl Deferred {
         self.len += found.hits.compress(&lanes, window(&mut self.lanes, first));
     }
 
-    /// Asks for the memory that tells which hits count. `block` tells where the ray of a slot is.
+    /// Prefetches the opacity micromaps that decide which hits count. `block` returns the block at which the ray of a
+    /// slot is.
     #[inline(always)]
     pub fn look_up<'a, S: Simd>(
         &mut self,
@@ -79,7 +80,7 @@ impl Deferred {
         }
     }
 
-    /// Number of hits; those to come begin anew. The hits stay until then.
+    /// Removes all hits and returns their number. Their values stay readable until the next hits overwrite them.
     #[inline(always)]
     pub fn clear(&mut self) -> usize {
         core::mem::take(&mut self.len)

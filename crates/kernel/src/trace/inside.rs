@@ -1,4 +1,4 @@
-//! What is around a point: what a half-line along x meets.
+//! What is around a point: which primitives a half-line along x crosses.
 
 use alloc::vec::Vec;
 
@@ -38,7 +38,7 @@ pub(crate) struct Around {
 }
 
 impl Around {
-    /// Sums up signed crossings of one list of geometries. Those of one primitive count once.
+    /// Sums up signed crossings of one list of geometries. Several crossings of one primitive count once.
     pub fn new(crossings: &mut Vec<(PrimRef, i32)>) -> Self {
         crossings.retain(|(_, count)| *count != 0);
         crossings.sort_unstable_by_key(|(id, _)| *id);
@@ -52,7 +52,7 @@ impl Around {
         around
     }
 
-    /// Adds what is around the point in an instance, whose sign [`into_object`] tells.
+    /// Adds what is around the point in an instance. `sign` is the one that [`into_object`] returns.
     pub fn add(&mut self, sign: i32, other: Self) {
         self.winding += sign * other.winding;
         self.is_inside |= other.is_inside;
@@ -82,7 +82,7 @@ pub(crate) fn around<const N: usize>(
     around
 }
 
-/// Primitives met and what they count: those in several leaves more than once.
+/// Primitives crossed, with their signed crossings. A primitive in several leaves is listed more than once.
 #[derive(Default)]
 struct Met {
     primitives: Vec<(PrimRef, i32)>,
@@ -121,7 +121,7 @@ impl Met {
         }
     }
 
-    /// Sums up what was met, and forgets it.
+    /// Sums up the crossings so far, and forgets them.
     fn around(&mut self) -> Around {
         let around = Around::new(&mut self.primitives);
         self.primitives.clear();
@@ -129,7 +129,7 @@ impl Met {
     }
 }
 
-/// Whether the half-line meets the box of a child.
+/// Whether the half-line hits the box of a child.
 #[inline(always)]
 fn is_met<const N: usize>(node: &Node<N>, slot: usize, [x, y, z]: [f64; 3]) -> bool {
     let lane = Node::<N>::lane(slot);

@@ -1,8 +1,8 @@
-//! The traversal that tells what it does: rays one after another, any order of children, any observer.
+//! The traversal that reports what it does: rays one after another, any order of children, any observer.
 //!
 //! Counts, logs and orders that look at the ray share this one loop. The order and the observer are chosen at run time,
-//! so the loop is compiled once per width and level. Node steps and leaf steps are those of [`crate::trace::single`], and
-//! so are the answers.
+//! so the loop is compiled once per width and level. Node steps and leaf steps are the ones of [`crate::trace::single`],
+//! and so are the answers.
 
 use alloc::vec::Vec;
 
@@ -154,7 +154,7 @@ mod tests {
     use crate::tree::binary::BinaryTree;
     use crate::tree::width::Width as NodeWidth;
 
-    /// Checks every place that it is told of against the tree.
+    /// Checks every place that is reported to it against the tree.
     struct Check<'a> {
         bvh: &'a WideTree<8>,
         goes_on: bool,
@@ -221,8 +221,8 @@ mod tests {
         }
     }
 
-    /// Every pick and every observer gives the plain answers, and tells where each child comes from. Rays that go on
-    /// meet the same nodes and occluders in any order, and more than rays that stop.
+    /// Every pick and every observer gives the plain answers, and reports where each child comes from. Rays that go on
+    /// visit the same nodes and occluders in any order, and more than rays that stop.
     #[test]
     fn answers_are_plain_and_places_lead_to_children() {
         let mut rng = Rng::new(81);
