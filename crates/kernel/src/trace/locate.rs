@@ -76,7 +76,7 @@ impl Sought<'_> {
     }
 }
 
-/// Searches the tree below a root: that of the world, or of the object that an instance places.
+/// Searches the tree below a root: the root of the world, or of the object that an instance places.
 fn search<const N: usize>(
     bvh: &WideTree<N>,
     stack: &mut [u32],

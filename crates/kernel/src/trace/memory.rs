@@ -21,13 +21,13 @@ pub(crate) struct Memory {
     pub entries: Vec<u64>,
     /// For the instrumented traversal.
     pub open: Vec<Open>,
-    /// For hits told front to back.
+    /// For hits reported front to back.
     pub ahead: Ahead,
     /// Answers that are to become bits.
     pub answers: Vec<bool>,
     /// Which rays of a batch packets have left over.
     pub pending: Vec<u32>,
-    /// Closest hits of which more is told.
+    /// Closest hits of queries that report surfaces; the answers are not used.
     pub hits: Vec<Option<Hit>>,
     /// Rays made ready for a stream.
     pub setups: Vec<RaySetup>,

@@ -13,7 +13,7 @@
 //! 8. `visit`: all hits of a ray, front to back; `several`: the nearest hits of many rays, in a stream; `conditional`: occlusion
 //!    under a `condition`.
 //! 9. `moving`: queries of trees that move, at the time of each ray.
-//! 10. `binary`: everything a ray meets in a binary tree.
+//! 10. `binary`: all nodes and hits of a ray in a binary tree.
 //!
 //! Points have queries of their own: `nearest`, what is near one, and `inside`, what is around one.
 //!

@@ -152,8 +152,8 @@ pub(crate) trait StreamQuery: Query {
         false
     }
 
-    /// [`StreamQuery::confirm`] for hits that meet a condition, without vectors: away from the loops. `ray` comes with the
-    /// instance interval. The second answer is the occluder.
+    /// [`StreamQuery::confirm`] for hits that have to fulfil a condition, without vectors: away from the loops. `ray`
+    /// comes with the instance interval. The second answer is the occluder.
     fn confirm_when<const N: usize>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,

@@ -1,4 +1,4 @@
-//! What traversals get of a batch: rays, the conditions that hits have to meet, and who gets a report beside the answers.
+//! What traversals get of a batch: rays, the conditions on hits, and who gets a report beside the answers.
 
 use core::fmt;
 use core::ops::Range;
@@ -83,7 +83,7 @@ impl<'a> RayBatch<'a> {
         }
     }
 
-    /// Only hits that meet the conditions count.
+    /// Only hits that fulfil the conditions count.
     pub fn under(self, conditions: Option<&'a Conditions<'a>>) -> Self {
         Self { conditions, ..self }
     }

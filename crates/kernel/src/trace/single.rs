@@ -104,8 +104,8 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
     }
 }
 
-/// Asks for the memory of a leaf of triangles or cut-outs; of nothing else. (Streams, which know that a child is a
-/// leaf, have [`crate::trace::leaf_places`].)
+/// Prefetches a leaf of triangles or cut-outs, and nothing else. (Streams, which know that a child is a leaf, have
+/// [`crate::trace::leaf_places`].)
 #[inline(always)]
 pub(super) fn prefetch_leaf<S: Simd, const N: usize>(simd: S, bvh: &WideTree<N>, child: Child) {
     let ChildKind::Leaf(Leaf { kind, index }) = child.kind() else {

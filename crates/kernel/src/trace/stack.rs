@@ -26,7 +26,7 @@ pub(crate) trait Item: Copy {
     fn unordered(child: Child) -> Self;
 }
 
-/// A child alone.
+/// A child without a distance.
 impl Item for u32 {
     const BOTTOM: Self = Child::DONE.0;
 

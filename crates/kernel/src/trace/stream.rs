@@ -14,11 +14,11 @@
 //! | `collect_cutouts` | at leaves of cut-outs | defers the hits, see [`crate::trace::deferred`] |
 //! | `enter_instances` | at instances | makes the ray ready for the object and visits its root |
 //! | `test_leaves` | at other leaves | one leaf step |
-//! | `confirm_hits` | at leaves with candidates | works out the distances of closest hits |
+//! | `confirm_hits` | at leaves with candidates | computes the distances of closest hits |
 //! | `settle_cutouts` | with deferred hits | decides whether they count |
 //!
 //! A pop comes a whole round after the push it may depend on, when that has long been written. Instances and micromaps
-//! are asked for a phase or more before they are needed.
+//! are prefetched a phase or more before they are needed.
 //!
 //! A node is prefetched a few node steps before its own, a leaf during a node step of the same round. Prefetching pays
 //! once the tree is larger than the caches. Prefetching all nodes at the beginning of the phase does not: what comes
@@ -48,7 +48,8 @@ use crate::tree::wide::WideTree;
 /// Rays in flight.
 const SLOTS: usize = 64;
 
-/// Node steps between asking for a node and testing it. A node asked for much earlier does not stay in the first cache.
+/// Node steps between prefetching a node and testing it. A node prefetched much earlier does not stay in the first
+/// cache.
 const AHEAD: usize = 4;
 
 /// Slots whose children are compared at once.
@@ -106,7 +107,7 @@ pub(crate) struct Stream<'a, Q: StreamQuery, const N: usize, const CAREFUL: bool
     /// Indices of the rays that are traced.
     pub pending: &'a [u32],
     pub answers: &'a mut [Q::Answer],
-    /// Whether nodes and leaves are asked for before their turn.
+    /// Whether nodes and leaves are prefetched.
     pub prefetch: bool,
 }
 
@@ -216,7 +217,7 @@ impl Space {
     };
 }
 
-/// Decides which lanes of a leaf meet the condition of their ray. Returns whether the ray goes on with a better hit.
+/// Decides which lanes of a leaf fulfil the condition of their ray. Returns whether the ray goes on with a better hit.
 ///
 /// No method: the compiler keeps nothing of a stream in registers whose reference goes to a function that is not inlined.
 #[inline(never)]
@@ -306,7 +307,7 @@ struct Flight<'a, S, Q: StreamQuery, const N: usize, const CAREFUL: bool> {
     /// Per slot: the leaf of the best hit, and the index of its instance.
     leaves: &'a mut [(Child, u32); SLOTS],
     deferred: &'a mut Deferred,
-    /// Slots that have a ray, or are to take one. The others are left alone: a few rays cost no more than they must.
+    /// Slots that have a ray, or are to take one. The others are skipped: a few rays cost no more than they must.
     live: Slots,
 }
 
@@ -342,7 +343,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
         self.tops[id] = stack.top();
     }
 
-    /// Sorts the slots by what they have come to. Instances are asked for, as they are needed last.
+    /// Sorts the slots by what they have come to. Instances are prefetched, as they are needed last.
     #[inline(always)]
     fn arrivals(&self, has_more_kinds: bool) -> Arrivals {
         let outer = self.at_least(Child::FIRST_OUTER);
@@ -431,8 +432,8 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
         }
     }
 
-    /// One node step for every slot that has come to a node. Meanwhile `leaves` are asked for, and nodes that are soon to
-    /// be visited.
+    /// One node step for every slot that has come to a node. Meanwhile `leaves` are prefetched, and nodes that are soon
+    /// to be visited.
     #[inline(always)]
     fn visit_nodes(&mut self, nodes: Slots, leaves: Slots) {
         let (mut coming_leaves, mut coming_nodes) = if self.prefetch {
@@ -471,7 +472,8 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
         self.tops[id] = stack.top();
     }
 
-    /// Leaves of cut-outs are tested. Their hits are deferred, and what tells whether these count is asked for.
+    /// Leaves of cut-outs are tested. Their hits are deferred, and the micromaps that decide whether these count are
+    /// prefetched.
     #[inline(always)]
     fn collect_cutouts(&mut self, slots: Slots) {
         for id in slots {
@@ -558,8 +560,8 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
         }
     }
 
-    /// Decides which lanes of a leaf that are left meet the condition of their ray: at hand for occlusion by triangles, which
-    /// are surely hit.
+    /// Decides which lanes of a leaf that are left fulfil the condition of their ray. Occlusion by triangles is decided
+    /// in this function, because they are surely hit, anything else in `confirm_when`.
     #[inline(always)]
     fn confirm_leaf(&mut self, id: usize) {
         let lanes = self.lanes[id];
@@ -587,7 +589,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
         }
     }
 
-    /// Decides which lanes of the leaf where a slot is meet the condition of their ray.
+    /// Decides which of these lanes of the leaf of a slot fulfil the condition of its ray.
     #[inline(always)]
     fn confirm_when(&mut self, id: usize, lanes: u32) {
         let child = Child(self.next[id]);

@@ -40,9 +40,9 @@ use crate::tree::wide::WideTree;
 pub struct Surface {
     /// The hit: distance, barycentric coordinates and ids.
     pub hit: Hit,
-    /// The point in the world: that of the ray at the distance `t`, worked out in double precision. On a triangle it is moved to
-    /// its plane, from which it is then away by no more than the rounding of the three coordinates, half a unit in the last place
-    /// of each. In an instance the plane is that of the transformed corners, in double precision.
+    /// The point in the world: the point of the ray at the distance `t`, computed in double precision. On a triangle it
+    /// is moved to its plane, from which it is then away by no more than the rounding of the three coordinates, half a
+    /// unit in the last place of each. In an instance the plane goes through the transformed corners, in double precision.
     pub position: [f32; 3],
     /// Geometric normal in the world, of length 1, as by [`Bvh::normal`](crate::Bvh::normal). Zero if there is none.
     pub normal: [f32; 3],

@@ -1,19 +1,19 @@
 //! All hits of a ray, one after another, front to back.
 //!
-//! Children still to visit wait in one heap, by the distance at which their boxes are entered, and hits not told yet in
-//! another. The nearest child is visited next, unless a hit lies before it: then that hit is told. No child is visited
-//! that begins behind the hit at which the visit ends.
+//! Children still to visit wait in one heap, by the distance at which their boxes are entered, and hits not reported yet
+//! in another. The nearest child is visited next, unless a hit lies before it: then that hit is reported. No child is
+//! visited that begins behind the hit at which the visit ends.
 //!
-//! # Why every hit is told once and in order
+//! # Why every hit is reported once and in order
 //!
 //! By [`crate::geometry::ray_setup`], every box above a hit is entered at or before the distance at which the hit is
 //! reported. In an instance the reported distance may have been clamped down to the end of the instance interval, so what
 //! is entered behind that end counts as entered there. So when the nearest child left begins behind a hit, all hits up to
 //! that one have been found.
 //!
-//! A triangle that lies in several leaves may be found again in any of them, also in one that is entered behind the
-//! hit. Such a hit does not come after the one told last, and all hits that do not have been told. So one comparison
-//! keeps it from being told twice.
+//! A triangle that lies in several leaves may be found again in any of them, also in one that is entered behind the hit.
+//! Such a hit does not come after the one reported last, and all hits that do not have been reported. So one comparison
+//! keeps it from being reported twice.
 //!
 //! Distances of children are at least 0 in the heap, so hits at negative distances wait until all children entered at or
 //! behind the origin are visited.
@@ -69,7 +69,7 @@ pub(crate) struct Visiting<'a, const N: usize> {
     pub bvh: &'a WideTree<N>,
     pub ahead: &'a mut Ahead,
     pub ray: &'a Ray,
-    /// Instances in which nothing meets it are left out. Hits are the business of `visit`.
+    /// Instances in which nothing fulfils it are left out. Hits are the business of `visit`.
     pub condition: Option<&'a Condition<'a>>,
     pub visit: &'a mut dyn FnMut(Hit) -> Visit,
 }
@@ -106,7 +106,7 @@ struct Space {
     interval: Interval,
 }
 
-/// A hit, in the order in which hits are told. The distance is no NaN and no negative zero.
+/// A hit, in the order in which hits are reported. The distance is no NaN and no negative zero.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ranked(pub Hit);
 
@@ -294,7 +294,7 @@ fn expand<S: Simd + Width<N>, const N: usize>(
     nearest
 }
 
-/// Finds the hits in a leaf. Filters are asked about those of cut-outs.
+/// Finds the hits in a leaf. Filters decide which hits on cut-outs count.
 #[inline(always)]
 fn search<S: Simd, const N: usize>(
     simd: S,

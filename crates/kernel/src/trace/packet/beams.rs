@@ -32,7 +32,8 @@ pub(super) struct Beams<'a> {
 }
 
 impl<'a> Beams<'a> {
-    /// Rows of a range, of at most [`RAYS`]. `None` if they are few or too far apart, or if one of them goes alone.
+    /// Rows of a range, of at most [`RAYS`]. `None` if they are few or too far apart, or if the interval of one
+    /// is empty or begins before 0.
     pub fn around(rows: &'a Rows<'a>, range: Range<usize>, extent: f32) -> Option<Self> {
         let mut beams = Self {
             rows,

@@ -1,7 +1,7 @@
 //! Packets of rays from one point in neighbouring directions.
 //!
-//! Neighbouring directions are mostly occluded by the same part of the scene. So the block of triangles that occluded the last
-//! packet is tested first, and the tree is asked about the rays that are left.
+//! Neighbouring directions are mostly occluded by the same part of the scene. So the block of triangles that occluded
+//! the last packet is tested first, and only the rays that are left are traced through the tree.
 
 use core::ops::Range;
 

@@ -91,7 +91,7 @@ pub(crate) struct GroupQuery<'a, const N: usize> {
 
 /// Answers, and rays without one.
 pub(crate) struct Found<'a> {
-    /// Bits of the rows, so many words for each. Those of open rays are set.
+    /// Bits of the rows, so many words for each. The bits of open rays are set.
     pub open: &'a mut [u64],
     /// Words of a row.
     pub words: usize,
@@ -148,7 +148,7 @@ impl Tally {
         self.rays += u64::from(rays);
     }
 
-    /// So many rays were answered by the guess alone.
+    /// Counts rays of a packet that the guess answered without the tree.
     #[inline(always)]
     pub fn guessed(&mut self, rays: u32) {
         self.work += u64::from(Self::SETUP);

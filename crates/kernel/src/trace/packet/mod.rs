@@ -6,8 +6,8 @@
 //! tested against all rays, with a lane for each. So a node costs sixteen rays as much as one, and what is tested in
 //! vain is little as long as they stay together.
 //!
-//! Rays of other kinds are left over for [`crate::trace::stream`], and so are packets that meet too much, or anything but
-//! triangles and nodes: they start anew there. Where packets do not pay they are soon hardly tried any more.
+//! Rays of other kinds are left over for [`crate::trace::stream`], and so are packets that visit too much, or anything
+//! but triangles and nodes: they start from scratch there. Where packets do not pay they are soon hardly tried any more.
 //!
 //! `rays` says how rays are made ready, and why no box is missed.
 
@@ -49,7 +49,7 @@ const FEW: u32 = 4;
 struct Luck {
     /// Packets that have paid less those that have not, within limits.
     score: i32,
-    /// Groups of rays to be left alone.
+    /// Groups of rays to pass by before a packet is tried again.
     wait: u32,
 }
 
@@ -88,7 +88,8 @@ pub(crate) struct Packet<'a, const N: usize> {
 }
 
 impl<const N: usize> Packet<'_, N> {
-    /// The lanes, among `lanes`, where a hit on a triangle of a block meets the condition of the ray. Reports these occluders.
+    /// The lanes, among `lanes`, where a hit on a triangle of a block fulfils the condition of the ray. Reports these
+    /// occluders.
     #[cold]
     #[inline(never)]
     fn occluders(
@@ -133,7 +134,7 @@ impl<const N: usize> Packet<'_, N> {
         counting
     }
 
-    /// Whether a hit of the ray in a lane meets its condition.
+    /// Whether a hit of the ray in a lane fulfils its condition.
     #[cold]
     #[inline(never)]
     fn counts(&self, lane: usize, hit: &Hit) -> bool {
@@ -146,8 +147,9 @@ impl<const N: usize> Packet<'_, N> {
 
 /// A query that can be answered in packets.
 pub(crate) trait PacketQuery: StreamQuery {
-    /// Traces a packet and writes the answers of its rays. Returns the lanes whose rays are left undecided. `guess` is the block of
-    /// triangles that occluded the packet before, if that may be of use, and becomes that of this packet.
+    /// Traces a packet and writes the answers of its rays. Returns the lanes whose rays are left undecided. `guess` is
+    /// the block of triangles that occluded the packet before, if that may be of use, and is set to the block
+    /// that occludes this one.
     fn traverse<S: Simd + Width<N>, const N: usize>(
         simd: S,
         packet: &Packet<'_, N>,
@@ -158,7 +160,7 @@ pub(crate) trait PacketQuery: StreamQuery {
     ) -> u32;
 }
 
-/// Answers those of the rays that go in packets, and lists the others.
+/// Answers the rays that go in packets, and lists the others.
 pub(crate) struct Packets<'a, Q: PacketQuery, const N: usize> {
     pub bvh: &'a WideTree<N>,
     /// Memory of a stack for this tree.

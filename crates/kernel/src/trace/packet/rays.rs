@@ -311,7 +311,7 @@ impl Frustum {
 }
 
 impl Frustum {
-    /// The test of N boxes at once. The distances that it tells are such that no ray enters before.
+    /// The test of N boxes at once. The distances that it returns are such that no ray enters before.
     #[inline(always)]
     pub fn test<S: Simd + Width<N>, const N: usize>(&self, simd: S) -> NodeTest<S, N> {
         NodeTest {

@@ -10,7 +10,7 @@ use crate::trace::packet::rays::{Frustum, Likeness, MAX_TURN, RAYS};
 #[derive(Clone, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct Sheaf {
-    /// `[axis][lane]`. Lanes without a direction have that of another one.
+    /// `[axis][lane]`. Lanes without a direction repeat another one.
     pub dir: [[f32; RAYS]; 3],
     /// See [`crate::geometry::ray_setup::Lengths`].
     pub shortest: [f32; RAYS],
@@ -210,8 +210,8 @@ impl Sheaf {
         })
     }
 
-    /// Frustum around rays from between two corners in the direction of a lane. `reach` is that of the farthest corner. `None` if
-    /// numbers are too far apart.
+    /// Frustum around rays from between two corners in the direction of a lane. `reach` is the largest `R`
+    /// of their origins, see [`crate::geometry::ray_setup`]. `None` if numbers are too far apart.
     #[inline(always)]
     pub fn beam(
         &self,
