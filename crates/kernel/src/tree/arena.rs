@@ -2,7 +2,7 @@
 //!
 //! | places of nodes | what |
 //! |---|---|
-//! | from 0 | the top level, made anew whenever an instance moves |
+//! | from 0 | the top level, made again whenever an instance moves |
 //! | behind it | empty nodes: room for a larger top level |
 //! | behind them | subtrees of the ground, the tree of what lies in the world itself |
 //! | behind them | the trees of objects |
@@ -58,8 +58,8 @@ impl<const N: usize> WideTree<N> {
         }
     }
 
-    /// Copies a tree without instances behind all others, and returns its place. Its filters are those of this object, or of
-    /// the ground. To add its root to those of objects is left to the caller.
+    /// Copies a tree without instances behind all others, and returns its place. Its filters belong to this object, or
+    /// to the ground. The caller adds its root to the roots of objects.
     ///
     /// # Errors
     /// More nodes or leaves than references can name; nothing has changed then.

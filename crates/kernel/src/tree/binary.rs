@@ -11,8 +11,8 @@ use crate::geometry::primitives::identity::Identity;
 /// Every primitive is in one leaf, or in several if [`Builder::Sbvh`](crate::recipe::Builder::Sbvh) has split it. Each of those
 /// leaves has a box around a part of it, and together they hold it all.
 ///
-/// Nodes stand in depth-first order: a left child follows its parent at once. An instance is a leaf of its
-/// own, and every object that is placed has a tree of its own. A tree over nothing has no nodes.
+/// Nodes are in depth-first order: a left child follows its parent at once. An instance is a leaf of its own, and every
+/// object that is placed has a tree of its own. A tree over nothing has no nodes.
 #[derive(Clone, Debug, Default)]
 pub struct BinaryTree {
     pub(crate) nodes: Vec<BinaryNode>,
@@ -20,7 +20,7 @@ pub struct BinaryTree {
     pub(crate) prims: Vec<u32>,
     /// The trees of all objects; empty where no instance needs one.
     pub(crate) objects: Vec<BinaryTree>,
-    /// That of the primitives it was built over.
+    /// Identity of the primitives that the tree was built over.
     pub(crate) identity: Identity,
 }
 
@@ -34,7 +34,7 @@ pub(crate) struct BinaryNode {
 /// Contents of a node.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum BinaryKind {
-    /// Two children: the left one is the next node, the right one stands `right` places behind this node.
+    /// Two children: the left one is the next node, the right one is `right` places behind this node.
     Inner { right: u32 },
     /// `count` entries of [`BinaryTree::prims`] from `first`.
     Leaf { first: u32, count: u32 },

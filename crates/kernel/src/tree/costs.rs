@@ -27,8 +27,8 @@ pub struct CostModel {
 }
 
 impl Default for CostModel {
-    /// A node costs 1, the other costs are relative to it. A full leaf block takes about as long as a node. The cost of a
-    /// cut-out is that of a filter which looks up a bit, with half of the questions answered by opacity micromaps (see
+    /// A node costs 1, the other costs are relative to it. A full leaf block takes about as long as a node. The cost of
+    /// a cut-out includes a filter which looks up a bit, with half of its calls saved by opacity micromaps (see
     /// [`crate::cutout::Opacity::coverage`]). `docs/notes/kernel.md` in the repository has measurements.
     fn default() -> Self {
         Self {

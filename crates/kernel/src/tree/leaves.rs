@@ -109,7 +109,7 @@ pub(crate) struct LeafPrim {
 }
 
 impl<const N: usize> WideTree<N> {
-    /// Number of a leaf among those of all kinds: triangle blocks first, the empty one included.
+    /// Number of a leaf among the leaves of all kinds: triangle blocks first, the empty one included.
     #[inline(always)]
     pub fn leaf_index(&self, leaf: Leaf) -> usize {
         let before = &self.blocks.lens()[..leaf.kind as usize];

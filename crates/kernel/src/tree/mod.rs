@@ -2,7 +2,7 @@
 //!
 //! - `binary`: the binary tree that every builder makes;  `costs`: what a node and a primitive cost
 //! - `node`: a node of N children and its references to them;  `wide`: the N-wide tree;  `leaves`: its leaf blocks by kind
-//! - `arena`: a tree put together from trees of objects;  `refit`: boxes and leaf blocks made anew
+//! - `arena`: a tree put together from trees of objects;  `refit`: boxes and leaf blocks of primitives that moved
 //! - `validate`: a check of every promise of the wide tree;  `statistics`: its bytes and its cost
 //! - `width`: how many children a node has;  `any`: a tree of any width
 //! - `motion`: what moves between two keys

@@ -18,7 +18,7 @@
 //! are a faster path in `trace/step.rs`, `trace/packet/`, `trace/binary.rs` and `trace/leaf_places.rs`.
 //!
 //! Builders need no change: primitives of different kinds never share a leaf, and boxes are all that matters to them.
-//! Logs, orders and collapses see leaves by their numbers, counts and costs alone.
+//! Logs, orders and collapses see only the numbers, counts and costs of leaves.
 
 use crate::aabb::Aabb;
 use crate::geometry::primitives::kinds::for_each_scalar_kind;
@@ -29,8 +29,8 @@ const _: () = assert!(Child::INSTANCE as usize + MAX_INSTANCES == Child::EXIT.0 
 
 /// A reference to a child, packed into 32 bits.
 ///
-/// Kinds are told apart by ranges of values, so that one comparison sorts many references at once. The upper
-/// four bits name the range, the lower bits count within it.
+/// Kinds are distinguished by ranges of values, so that one comparison sorts many references at once. The upper four
+/// bits name the range, the lower bits count within it.
 ///
 /// | first value | meaning | capacity |
 /// |---|---|---|
@@ -58,7 +58,7 @@ pub(crate) enum ChildKind {
     Instance(usize),
 }
 
-/// A leaf: the kind of all its primitives, and the index of its block among those of the kind.
+/// A leaf: the kind of all its primitives, and the index of its block among the blocks of the kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Leaf {
     pub kind: PrimKind,
@@ -130,8 +130,8 @@ impl Child {
         (self.0 & Self::WIDE_INDEX) as usize
     }
 
-    /// How the memory of a leaf is asked for: 0 as a leaf of triangles, 2 as one of cut-outs, 1 as any other leaf, 3 as
-    /// an instance. Without meaning for inner nodes.
+    /// How a leaf is prefetched: 0 as a leaf of triangles, 2 as one of cut-outs, 1 as any other leaf, 3 as an instance.
+    /// Without meaning for inner nodes.
     #[inline(always)]
     pub fn leaf_kind(self) -> usize {
         /// Two bits for every value of the upper three bits of a reference.

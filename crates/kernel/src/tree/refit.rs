@@ -1,7 +1,7 @@
-//! Refit: leaf blocks and boxes made anew for primitives that moved, with all nodes, slots and lanes as they are.
+//! Refit: leaf blocks and boxes recomputed for primitives that moved, with all nodes, slots and lanes as they are.
 //!
-//! Leaf blocks first, then nodes from below. Nodes of a subtree stand together, so large trees are cut into subtrees that
-//! threads work on at the same time.
+//! Leaf blocks first, then nodes from below. Nodes of a subtree follow each other, so large trees are cut into subtrees
+//! that threads work on at the same time.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -24,7 +24,7 @@ const BLOCKS: usize = 1024;
 /// Subtrees of at most so many nodes are the work of one thread.
 const NODES: usize = 2048;
 
-/// Nodes and leaf blocks of one tree among those of a world.
+/// Nodes and leaf blocks of one tree among the nodes and blocks of a world.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct TreePlaces {
     pub nodes: Range<usize>,
@@ -33,7 +33,7 @@ pub(crate) struct TreePlaces {
 }
 
 impl TreePlaces {
-    /// The place of a leaf alone.
+    /// The place of a single leaf: no nodes, and its block.
     pub fn of_leaf(Leaf { kind, index }: Leaf) -> Self {
         let mut places = Self::default();
         places.blocks[kind as usize] = index..index + 1;
@@ -182,7 +182,8 @@ impl<'a> LeafBounds<'a> {
     }
 }
 
-/// Makes the boxes of a node anew. Those of its children are. `first` is the place of the first of `nodes` in the tree.
+/// Recomputes the boxes of a node. The boxes of its children are already new. `first` is the place of the first of
+/// `nodes` in the tree.
 fn refit_node<const N: usize>(
     nodes: &mut [Node<N>],
     first: usize,
@@ -201,8 +202,8 @@ fn refit_node<const N: usize>(
     }
 }
 
-/// Cuts a tree, or what is left of one that was taken apart, into subtrees that are small enough, and the nodes above them, both in
-/// ascending order. Indices count from the first of `nodes`, which stands at `first` in the tree.
+/// Cuts a tree, or what is left of one that was taken apart, into subtrees that are small enough, and the nodes above
+/// them, both in ascending order. Indices count from the first of `nodes`, which is at `first` in the tree.
 fn cut<const N: usize>(
     nodes: &[Node<N>],
     first: usize,
@@ -239,7 +240,7 @@ fn up_to(starts: Vec<usize>, end: usize) -> Vec<Range<usize>> {
     ranges.into_iter().map(|(start, end)| start..end).collect()
 }
 
-/// The nodes that no other refers to, if the nodes of every subtree stand together.
+/// The nodes that no other refers to, if the nodes of every subtree follow each other.
 fn roots_of<const N: usize>(nodes: &[Node<N>], first: usize) -> Option<Vec<usize>> {
     // Per node, how many nodes are in its subtree, and behind the last of them.
     let mut sizes = vec![(1, 0); nodes.len()];

@@ -1,8 +1,8 @@
 //! Trees as words of a file: see [`super::words`].
 //!
-//! Only what is there is written: occupied slots and lanes. Blocks and nodes are then made as a collapse makes them, so that
-//! their empty lanes keep their promises whatever a file says. [`WideTree::walk`] checks the rest, with boxes around leaves
-//! that are made while their primitives are at hand.
+//! Only what is there is written: occupied slots and lanes. Blocks and nodes are then made as a collapse makes them, so
+//! that their empty lanes keep their promises whatever a file says. [`WideTree::walk`] checks the rest, with boxes
+//! around leaves that are made while their primitives are available.
 
 use alloc::format;
 use alloc::sync::Arc;
@@ -37,7 +37,7 @@ const EMPTY_NODE: usize = 7;
 const NO_SHAPE: u32 = u32::MAX;
 
 impl<const N: usize> WideTree<N> {
-    /// Bytes of memory that a file of the tree takes, at most, but for those of shapes and filters.
+    /// Bytes of memory that a file of the tree takes, at most, without the bytes of shapes and filters.
     pub fn file_bytes(&self) -> usize {
         self.nodes.len() * 28 * N / 2 + self.blocks.triangles.len() * (4 + 44 * BLOCK)
     }

@@ -13,9 +13,9 @@ use crate::shape::Shape;
 pub struct SlotOrder {
     /// Shape of the tree it was planned for.
     pub(crate) shape: Shape,
-    /// Per node, N entries: which slot comes to stand here. Empty: leave the nodes as they are.
+    /// Per node, N entries: which slot moves to this place. Empty: leave the nodes as they are.
     pub(crate) slots: Vec<u8>,
-    /// Per leaf: which lane comes to stand here. Empty: leave the leaves as they are.
+    /// Per leaf: which lane moves to this place. Empty: leave the leaves as they are.
     pub(crate) lanes: Vec<[u8; BLOCK]>,
     /// How queries pick; by slot, as a rule.
     pub(crate) pick: Rule,

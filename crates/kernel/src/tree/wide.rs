@@ -16,9 +16,9 @@ use crate::tree::slot_order::{SlotOrder, occupied_first};
 /// A tree of nodes with `N` children, or one tree over the world and one for each object that instances place
 /// in it.
 ///
-/// Node 0 is the root of the world's and always exists; the trees of objects stand behind it, one after the
-/// other. Children follow their parents, also from an instance to the root of its object. Triangle block 0 is
-/// empty: empty slots refer to it.
+/// Node 0 is the root of the world's tree and always exists; the trees of objects are behind it, one after the other.
+/// Children follow their parents, also from an instance to the root of its object. Triangle block 0 is empty: empty
+/// slots refer to it.
 #[derive(Clone, Debug)]
 pub(crate) struct WideTree<const N: usize> {
     pub nodes: Vec<Node<N>>,
@@ -33,7 +33,7 @@ pub(crate) struct WideTree<const N: usize> {
     pub bounds: Aabb,
     /// Scene extent: largest absolute coordinate, see [`crate::geometry::ray_setup`].
     pub reach: f32,
-    /// Levels of nodes, the root being one: those of the world's tree and of the deepest object together.
+    /// Levels of nodes, the root being one: the levels of the world's tree and of the deepest object together.
     pub depth: usize,
     /// How occlusion queries pick the next child.
     pub pick: Rule,
@@ -48,7 +48,7 @@ pub(crate) struct PlacedTree {
     pub placement: Placement,
     /// The root of its object.
     pub root: u32,
-    /// Its object, as users number them. In a tree from a file objects are numbered anew.
+    /// Its object, as users number them. In a tree from a file objects have new numbers.
     pub object: u32,
     /// The transform as the user gave it, for queries about points. Rays never look at it.
     pub world_from_object: [[f32; 4]; 3],
