@@ -91,8 +91,8 @@ impl Best {
         self.offer_if(hit, || true)
     }
 
-    /// As long as the best hit is not nearer than the end of the instance interval, anything in the instance may be clamped
-    /// there and be the better one.
+    /// Limit for the best hit so far. As long as that hit is not nearer than the end of the instance interval, anything
+    /// in the instance may be clamped there and be the better one.
     #[inline(always)]
     fn limit_now(&self) -> f32 {
         if self.hit.t < self.interval.leave {

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use crate::geometry::curve::Curves;
 use crate::math;
 
-/// What four control points mean.
+/// Meaning of the four control points of a cubic curve.
 ///
 /// ```
 /// use antumbra::{CurveBasis, Curves};
@@ -116,7 +116,7 @@ impl CurveBasis {
         };
         match self {
             Self::Bezier => control,
-            // The ends are worked out in the same way for neighbours, which makes them one point.
+            // The ends are computed in the same way for neighbours, which makes them one point.
             Self::BSpline => [
                 core::array::from_fn(|i| (a[i] + 4.0 * b[i] + c[i]) / 6.0),
                 mix([0.0, 2.0, 1.0, 0.0], 3.0),

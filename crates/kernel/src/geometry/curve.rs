@@ -21,18 +21,18 @@ use crate::ray::{Hit, Ray};
 /// the flat curve of pbrt and Embree.
 ///
 /// # What is hit
-/// Let the plane be perpendicular to the ray, through its origin. The ray is a point of it, and a segment is projected onto it
-/// along the ray. The nearest point of the projected segment is at a share `s` of its length, 0 at the first point and 1
-/// at the second one. The segment is hit if the distance to that point is at most the radius there,
-/// `(1 - s) radius₀ + s radius₁`, and if the ray passes that point of the axis at a `t` in its interval. All of it is worked
-/// out in double precision, and in the same bits on every level.
+/// Let the plane be perpendicular to the ray, through its origin. The ray is a point of it, and a segment is projected
+/// onto it along the ray. The nearest point of the projected segment is at a share `s` of its length, 0 at the first
+/// point and 1 at the second one. The segment is hit if the distance to that point is at most the radius there,
+/// `(1 - s) radius₀ + s radius₁`, and if the ray passes that point of the axis at a `t` in its interval. All of it is
+/// computed in double precision, and in the same bits on every level.
 ///
-/// Where a segment goes on in the next one, that makes a round joint: neighbours share it, and no ray passes between them.
-/// The first and the last end of a chain are cut off flat.
+/// Two segments that follow each other make a round joint: they share it, and no ray passes between them. The first and
+/// the last end of a chain are cut off flat.
 ///
 /// `u` of a hit is `s`. `v` goes from 0 at one side over 1/2 on the axis to 1 at the other side, which is on the left of
-/// the axis for someone who looks along the ray with up along the axis. [`Bvh::normal`](crate::Bvh::normal) is perpendicular to the
-/// axis and faces the ray. A ray may hit several segments of a curve.
+/// the axis for someone who looks along the ray with up along the axis. [`Bvh::normal`](crate::Bvh::normal) is
+/// perpendicular to the axis and faces the ray. A ray may hit several segments of a curve.
 ///
 /// [`Bvh::closest`](crate::Bvh::closest) and its relatives find the nearest point of the axis. Curves have no inside.
 ///
@@ -257,9 +257,10 @@ impl ScalarShape for CurveSegment {
     }
 }
 
-/// What a distance across a ray may be off in single precision, relative to `R`: `256 u`, see [`CurveSegment::candidates`].
+/// Error bound of a distance across a ray in single precision, relative to `R`: `256 u`, see
+/// [`CurveSegment::candidates`].
 const ACROSS: f32 = 1.0 / (1 << 16) as f32;
-/// What the place of the nearest point may be off, times the length that is seen, relative to `R`: `512 u`.
+/// Error bound of the place of the nearest point, times the length that is seen, relative to `R`: `512 u`.
 const PLACE: f32 = 1.0 / (1 << 15) as f32;
 /// Segments of which less than this share is seen are left to the test.
 const SEEN2: f32 = 1.0 / (1 << 20) as f32;
@@ -276,11 +277,12 @@ impl ScalarPrim for CurveSegment {
 
     /// The rule in single precision, for all segments at once, in units of [`crate::geometry::ray_setup`].
     ///
-    /// Let `a` be the way to the first end and `e` the axis, both as seen along the ray. Translation and projection leave an error of
-    /// at most `28 u R` in `a`, and `28 u |axis|` in `e`. So at any share `s` the distance is off by at most `130 u R`. The share is
-    /// not exact, but how far the distance may fall below what is found at `s` follows from the slope there, `g = s e² + a e`: by
-    /// `g² / e²` of its square. `g` is 0 but for roundings, which for a ray that hits, with `|a| <= r + |e|`, are at most
-    /// `(28 u R + 116 u |axis|) |e|` and a share of `r`. As `|axis|` is at most `3.5 R`, that is less than `PLACE R |e|`.
+    /// Let `a` be the way to the first end and `e` the axis, both as seen along the ray. Translation and projection
+    /// leave an error of at most `28 u R` in `a`, and `28 u |axis|` in `e`. So at any share `s` the distance is off by
+    /// at most `130 u R`. The share is not exact, but how far the distance may fall below what is found at `s` follows
+    /// from the slope there, `g = s e² + a e`: by `g² / e²` of its square. `g` is 0 but for roundings, which for a ray
+    /// that hits, with `|a| <= r + |e|`, are at most `(28 u R + 116 u |axis|) |e|` and a share of `r`. As `|axis|` is at
+    /// most `3.5 R`, that is less than `PLACE R |e|`.
     #[inline(always)]
     fn candidates(segments: &[Self; BLOCK], count: usize, ray: &RaySetup) -> u32 {
         let all = (1 << count) - 1;
@@ -348,8 +350,8 @@ mod tests {
     use super::*;
     use antumbra_testkit::Rng;
 
-    /// Whatever is hit is a candidate, however thin the segment, however far away the ray begins, also at the very edge; and few
-    /// others are.
+    /// Whatever is hit is a candidate, however thin the segment, however far away the ray begins, also at the very edge.
+    /// Few others are.
     #[test]
     fn what_is_hit_is_a_candidate() {
         let mut rng = Rng::new(77);

@@ -96,8 +96,8 @@ impl ScalarShape for Disk {
         }
     }
 
-    /// Where the ray passes the plane, if that is no farther from the centre than the radius. In double precision, which
-    /// the levels share, so the bits are the same on all of them.
+    /// Hit at the point where the ray passes the plane, if that is no farther from the centre than the radius. In double
+    /// precision, which the levels share, so the bits are the same on all of them.
     fn hit(&self, _: u32, ray: &RaySetup, _: f32) -> Option<[f32; 3]> {
         let dir = ray.dir.map(f64::from);
         let normal = self.normal.map(f64::from);

@@ -1,8 +1,8 @@
 //! The arithmetic of the triangle test in vectors: one ray against many triangles, or many rays against one.
 //!
 //! The arithmetic does not depend on what the lanes stand for, and nothing is fused where that could decide, so both
-//! ways give the same bits. The test is described in [`crate::geometry::triangle`], what can be said of a hit
-//! without a division in [`crate::geometry::ray_setup`].
+//! uses give the same bits. The test is described in [`crate::geometry::triangle`], what can be said of a hit without a
+//! division in [`crate::geometry::ray_setup`].
 
 use antumbra_simd::Lanes;
 
@@ -43,7 +43,7 @@ impl<V> Shear<V> {
         ]
     }
 
-    /// What makes distances of coordinates on the last axis.
+    /// Factor from coordinates on the last axis to distances.
     #[inline(always)]
     pub fn per_z(&self) -> V
     where
@@ -67,7 +67,7 @@ pub(crate) struct Edges<V> {
     pub u: V,
     pub v: V,
     pub w: V,
-    /// Their sum.
+    /// Sum of the edge functions.
     pub det: V,
     /// Mean of the distances of the corners, weighted by the edge functions: the distance of the hit times `det`.
     t_det: V,
@@ -130,7 +130,7 @@ impl<V> Edges<V> {
         V: Lanes<L>,
     {
         let zero = V::splat(simd, 0.0);
-        // All three of one sign, that of their sum, or none of them counts.
+        // All three of one sign, the sign of their sum, or none of them counts.
         let [u, v, w] = [
             self.u.flip_sign(self.det),
             self.v.flip_sign(self.det),

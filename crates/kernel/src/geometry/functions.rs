@@ -7,7 +7,8 @@ use core::fmt;
 use crate::error::Error;
 use crate::geometry::{Opacity, UserGeometry};
 
-/// Filters and shapes of a saved tree, object or world. No file can hold functions, so whoever reads the file gives them again.
+/// Filters and shapes of a saved tree, object or world. No file can hold functions, so the reader of the file gives them
+/// again.
 ///
 /// | list | one for each |
 /// |---|---|

@@ -26,7 +26,7 @@ use crate::ray::Ray;
 /// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LocalOrigin {
-    /// Where the origin lies in the world.
+    /// World coordinates of the local origin.
     pub origin: [f64; 3],
 }
 

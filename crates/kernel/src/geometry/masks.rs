@@ -7,8 +7,9 @@ use crate::ray::INVALID_ID;
 /// Masks of the geometries and instances of a scene, 32 bits each. Queries that give a mask see only what has a bit in
 /// common with it: the geometry and, if it lies in one, the instance.
 ///
-/// What a list does not reach has all bits. Numbers behind the last geometry or instance have no meaning. Queries without a
-/// mask see everything, and masks cost them nothing. Queries about points see everything.
+/// Geometries and instances beyond the end of a list have all bits set. Numbers behind the last geometry or instance
+/// have no meaning. Queries without a mask see everything, and masks cost them nothing. Queries about points see
+/// everything.
 ///
 /// Masks are no part of a tree: they may change at any time and cost no build. See [`Bvh::set_masks`](crate::Bvh::set_masks).
 ///

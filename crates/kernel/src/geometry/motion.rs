@@ -13,7 +13,7 @@ use crate::geometry::primitives::Primitives;
 /// Coordinates of keys are below this: `2¹²⁵`, so that differences of two are far from overflow.
 const LARGEST: f32 = (1u128 << 125) as f32;
 
-/// Where a time lies among keys: the span between two of them, and the share of that span, from 0 to 1.
+/// Place of a time among keys: the span between two of them, and the share of that span, from 0 to 1.
 ///
 /// Times before 0 and NaN count as 0, times after 1 as 1.
 pub(crate) fn locate(time: f32, spans: usize) -> (usize, f32) {
@@ -147,9 +147,10 @@ impl<'a> MovingMesh<'a> {
 
 /// An instance whose transform moves: one transform for each key.
 ///
-/// The keys lie evenly from time 0 to time 1. Between two keys the translation moves in a straight line. The rest is taken apart
-/// into a rotation and a stretch (polar decomposition). The rotation turns about one axis at one speed, the shorter way, and the
-/// stretch changes linearly. The transform of a time is rounded to `f32`. An instance with one key does not move.
+/// The keys lie evenly from time 0 to time 1. Between two keys the translation moves in a straight line. The rest is
+/// divided into a rotation and a stretch (polar decomposition). The rotation turns about one axis at one speed, the
+/// shorter way, and the stretch changes linearly. The transform of a time is rounded to `f32`. An instance with one key
+/// does not move.
 ///
 /// ```
 /// use antumbra::MovingInstance;

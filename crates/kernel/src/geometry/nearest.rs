@@ -7,7 +7,7 @@ use crate::geometry::Sphere;
 use crate::geometry::instance::{Affine, dot};
 use crate::math;
 
-/// Where a primitive is nearest to a point.
+/// Nearest point of a primitive to a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Near {
     pub distance2: f64,

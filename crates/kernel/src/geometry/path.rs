@@ -44,7 +44,7 @@ pub(crate) fn between(start: f32, end: f32, share: f32) -> f32 {
     start + share * (end - start)
 }
 
-/// A transform between two keys, taken apart.
+/// A transform between two keys, as a translation, a rotation and a stretch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Path {
     moved: [[f64; 3]; 2],

@@ -47,7 +47,7 @@ pub(crate) fn told_uv(prim_id: u32, [u, v]: [f32; 2]) -> [f32; 2] {
     }
 }
 
-/// Which half of a quad a hit with these barycentrics is on. On the diagonal, the first one.
+/// Half of a quad, 0 or 1, in which a hit with these barycentrics lies. On the diagonal, the first one.
 pub(crate) fn half_at([u, v]: [f32; 2]) -> usize {
     usize::from(u + v > 1.0)
 }
@@ -58,8 +58,8 @@ pub(crate) fn half<T>([a, b, c, d]: [T; 4], half: usize) -> [T; 3] {
     if half == 0 { [a, b, d] } else { [c, d, b] }
 }
 
-/// Which halves of a quad can be kept. Some writers of files make a triangle of a quad by giving a corner twice: then one
-/// half is left, or two.
+/// Whether each half of a quad can be kept. Some writers of files make a triangle of a quad by giving a corner twice:
+/// then one half is left, or two.
 ///
 /// # Errors
 /// Why neither can.

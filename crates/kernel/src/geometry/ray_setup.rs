@@ -185,7 +185,7 @@ pub(crate) enum Axis {
     Z,
 }
 
-/// Which of the two planes of an axis.
+/// One of the two planes of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Side {
@@ -220,7 +220,7 @@ pub(crate) struct RaySetup {
     /// Input of the slab test: the reciprocal direction; `org * rdir`, widened so that near planes come nearer;
     /// the same, widened so that far planes go farther. 0, +∞ and -∞ when culling is off.
     pub slabs: [[f32; 4]; 3],
-    /// Which plane of an axis is the near one. A fourth, so that they are copied as one word.
+    /// Near plane of each axis. A fourth, so that they are copied as one word.
     pub near: [Side; 4],
     /// The axes x, y, z of the shear: z is the one of the largest direction component.
     pub axes: [Axis; 3],

@@ -30,7 +30,7 @@ pub(crate) struct ShearedTriangle {
     x: [f32; 3],
     y: [f32; 3],
     z: [f32; 3],
-    /// What a coordinate on the last axis is multiplied with to become a distance.
+    /// Factor from coordinates on the last axis to distances.
     per_z: f32,
 }
 

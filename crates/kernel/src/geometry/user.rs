@@ -29,7 +29,7 @@ use crate::ray::{Hit, Ray};
 ///   there. The interval is always the whole one of the query.
 /// - A function is called only where the ray's interval overlaps the box of the primitive. The order of calls is not
 ///   defined.
-/// - A hit counts if `tnear < t < tfar`. Any other, and one whose `t` is NaN, is as good as none.
+/// - A hit counts if `tnear < t < tfar`. Any other is ignored, also one whose `t` is NaN.
 /// - The ray must be in the box at `t`. A distance outside of it is moved to the nearer end of the part of the ray that is
 ///   inside, so boxes must be large enough.
 /// - `u` and `v` are handed on as they are.
@@ -132,7 +132,7 @@ pub trait UserGeometry: fmt::Debug + Send + Sync {
     }
 }
 
-/// Where an object is that no instance places.
+/// Transform of an object that no instance places.
 const IDENTITY: [[f64; 4]; 3] = [
     [1.0, 0.0, 0.0, 0.0],
     [0.0, 1.0, 0.0, 0.0],
@@ -224,7 +224,7 @@ impl ScalarShape for UserPrim {
             return None;
         }
         let UserHit { t, u, v } = self.shape.as_ref()?.intersect(prim_id, ray)?;
-        // Both intervals meet, so the clamped distance is in the ray's interval if this is.
+        // Both intervals share a point, so the clamped distance is in the ray's interval if this is.
         (ray.tnear < t && t < ray.tfar).then(|| [interval.clamp(t), u, v])
     }
 

@@ -38,7 +38,8 @@ pub(crate) struct CutoutBlock {
     pub patterns: [u32; BLOCK],
 }
 
-/// The filters and micromaps that decide whether hits of cut-outs count. All trees over the same primitives have one, for the world and its objects.
+/// The filters and micromaps that decide whether hits of cut-outs count. All trees over the same primitives share one
+/// value, for the world and its objects.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Filters {
     pub opacities: Vec<MeshFilter>,
@@ -58,7 +59,7 @@ pub(crate) struct MeshFilter {
 /// A triangle that filters are called with for all triangles of the same pattern.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Representative {
-    /// Its filter, one of [`Filters::opacities`].
+    /// Index of the triangle's filter in [`Filters::opacities`].
     pub filter: u32,
     pub id: PrimRef,
 }

@@ -74,8 +74,8 @@ pub trait Opacity: fmt::Debug + Send + Sync {
     }
 }
 
-/// Pattern of a partly transparent triangle: see [`Opacity::pattern`]. Any 256 bits, such as the texture coordinates of the three
-/// corners and a number for the picture.
+/// Pattern of a partly transparent triangle: see [`Opacity::pattern`]. Any 256 bits, such as the texture coordinates of
+/// the three corners and a number for the picture.
 ///
 /// ```
 /// use antumbra::cutout::Pattern;

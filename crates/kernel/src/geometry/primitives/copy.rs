@@ -15,20 +15,20 @@ use crate::geometry::sound::{check_indices, check_triangle, corners, is_sound};
 use crate::geometry::{Geometry, GeometryId, PrimRef, QuadMesh, TriangleMesh};
 use crate::parallel::{chunk_len, fill};
 
-/// Primitives of one list of geometries.
+/// Most primitives in one list of geometries.
 const MAX_PRIMITIVES: usize = 1 << 29;
 
-/// Primitives of any other kind than triangles of one list of geometries.
+/// Most primitives of each kind other than triangles in one list of geometries.
 const MAX_SCALARS: usize = 1 << 28;
 
 /// Filter of a triangle whose mesh has none.
 pub(super) const NO_FILTER: u32 = u32::MAX;
 
-/// Checked copies of a list of geometries. Nobody knows yet which triangles are partly transparent.
+/// Checked copies of a list of geometries, before filters decide which triangles are partly transparent.
 #[derive(Default)]
 pub(super) struct Copied {
     pub triangles: Vec<[[f32; 3]; 3]>,
-    /// As many as `triangles`.
+    /// Names of the triangles, as many as `triangles`.
     pub triangle_refs: Vec<PrimRef>,
     /// Per triangle, the index of its filter, or [`NO_FILTER`]. Empty if no mesh of the list has a filter.
     pub filter_of: Vec<u32>,

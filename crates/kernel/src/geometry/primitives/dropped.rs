@@ -1,4 +1,4 @@
-//! What was left out of the primitives, and why.
+//! Primitives and instances that were left out, and why.
 
 use core::fmt;
 
@@ -27,14 +27,14 @@ pub enum Dropped {
         geom_id: u32,
         /// Index of the primitive in its geometry.
         prim_id: u32,
-        /// What is wrong with it.
+        /// Reason for which the primitive was dropped.
         reason: DropReason,
     },
     /// An instance.
     Instance {
         /// Index of the instance.
         inst_id: u32,
-        /// What is wrong with it.
+        /// Reason for which the instance was dropped.
         reason: DropReason,
     },
 }

@@ -1,4 +1,4 @@
-//! Which primitives something was made of.
+//! Identity of a list of primitives, which is shared by all that is made of it.
 
 use alloc::sync::Arc;
 

@@ -83,7 +83,7 @@ impl PrimKind {
 #[derive(Clone, Debug)]
 pub(crate) struct List<P> {
     prims: Vec<P>,
-    /// As many.
+    /// Names of the primitives, as long as `prims`.
     refs: Vec<PrimRef>,
 }
 
@@ -214,12 +214,12 @@ impl Primitives {
         lens
     }
 
-    /// Where a kind begins in the numbering.
+    /// Number of the first primitive of a kind: primitives are numbered kind after kind.
     pub(crate) fn start_of(&self, kind: PrimKind) -> usize {
         self.kind_lens()[..kind as usize].iter().sum()
     }
 
-    /// Where the second and each later kind of primitives begins in the numbering.
+    /// Number of the first primitive of the second and each later kind.
     pub(crate) fn kind_starts(&self) -> [usize; PrimKind::COUNT - 1] {
         let lens = self.kind_lens();
         let mut start = 0;
@@ -310,10 +310,10 @@ impl Primitives {
     }
 }
 
-/// A partly transparent triangle, apart from its corners.
+/// A partly transparent triangle, without its corners.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct OwnCutout {
-    /// Its own filter, one of [`crate::geometry::cutout::Filters::opacities`]: called where no tree is used.
+    /// Index of its own filter in [`crate::geometry::cutout::Filters::opacities`], which is called where no tree is used.
     pub filter: u32,
     pub known: Cutout,
 }

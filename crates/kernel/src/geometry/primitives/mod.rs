@@ -66,7 +66,7 @@ pub(crate) use place::MAX_INSTANCES;
 pub struct Primitives {
     /// The opaque ones first, then the partly transparent ones.
     pub(crate) triangles: Vec<[[f32; 3]; 3]>,
-    /// As many as `triangles`.
+    /// Names of the triangles, as many as `triangles`.
     pub(crate) triangle_refs: Vec<PrimRef>,
     /// One for each partly transparent triangle, which are the last of `triangles`.
     cutouts: Vec<OwnCutout>,

@@ -31,7 +31,7 @@ pub(super) fn asked_for(instances: &[Instance], objects: usize) -> Result<Vec<bo
     Ok(named(instances.iter().map(|one| one.object), objects))
 }
 
-/// Which of so many objects are named.
+/// Which of `objects` objects occur among `names`.
 fn named(names: impl Iterator<Item = u32>, objects: usize) -> Vec<bool> {
     let mut is_named = vec![false; objects];
     for object in names {

@@ -2,7 +2,7 @@
 
 use super::{MapRef, MicroMaps, Parts};
 
-/// Where micromaps went that joined others.
+/// Offset of micromaps that were appended to others, in words of 64 parts.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Moved(usize);
 

@@ -78,7 +78,7 @@ impl Disk {
     fn maps(&self, count: usize) -> (MicroMaps, Vec<Known>) {
         let (maps, known, mixed) =
             MicroMaps::new(count, |index| (self as &dyn Opacity, index as u32));
-        // Whoever is asked for others shows the same as they.
+        // The representative of a pattern has this pattern and the same micromap.
         for (index, of_it) in known.iter().enumerate() {
             if let Known::Mixed(cutout) = of_it {
                 let asked = mixed[cutout.pattern as usize];
