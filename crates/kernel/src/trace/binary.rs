@@ -40,13 +40,13 @@ pub(crate) struct LeafHits<'a> {
     pub primitives: &'a Primitives,
     /// All primitives of the leaf, or its instance.
     pub prims: &'a [u32],
-    /// Where they begin in [`BinaryTree::prims`].
+    /// Index of the first of `prims` in [`BinaryTree::prims`].
     pub first: u32,
     lanes: u32,
 }
 
 impl Iterator for LeafHits<'_> {
-    /// Which of the primitives is hit.
+    /// Index in `prims` of a primitive that is hit.
     type Item = usize;
 
     #[inline(always)]
@@ -219,9 +219,9 @@ impl<'a, W: Witness> Follower<'a, W> {
     }
 }
 
-/// Which of the primitives of a leaf the ray hits, as bits. A partly transparent triangle is hit by the rays that
-/// it occludes, so that it counts with its opacity (Ogaki and Derouet-Jourdan 2016, section 4.2):
-/// stochastically, but each ray as it would be answered.
+/// Primitives of a leaf that the ray hits, as bits. A partly transparent triangle is hit by the rays that it occludes,
+/// so that it counts with its opacity (Ogaki and Derouet-Jourdan 2016, section 4.2): stochastically, but each ray as it
+/// would be answered.
 fn prim_hits(
     primitives: &Primitives,
     tree: &BinaryTree,

@@ -39,7 +39,7 @@ fn offer_list(list: &Primitives, place: &Place<'_>, inst_id: u32, seeker: &mut d
     }
 }
 
-/// What is around a point, which is finite.
+/// Winding number around a point, which is finite, and whether the point is inside.
 pub(crate) fn around(world: &Primitives, point: [f32; 3]) -> Around {
     let point = point.map(f64::from);
     let mut around = around_in(world, point);

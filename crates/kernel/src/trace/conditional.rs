@@ -100,7 +100,7 @@ fn improve<B: LeafBlock>(
         if !condition.may_count(named(block.id(lane), ray)) {
             continue;
         }
-        // The condition may cost the most, so it is asked last.
+        // The condition may cost the most, so it is checked last.
         let hit = block.hit(lane, ray, filters, QueryKind::Intersect);
         if let Some(hit) = hit.and_then(|hit| best.preceded_by(hit))
             && condition.is_behind(&hit)

@@ -28,7 +28,7 @@ pub(crate) fn into_object(
     Some((affine.inverse()?.point(point), sign))
 }
 
-/// What is around a point.
+/// Winding number around a point, and whether the point is inside.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Around {
     /// Sum of all signed crossings.
@@ -59,7 +59,7 @@ impl Around {
     }
 }
 
-/// What is around a point, which is finite.
+/// Winding number around a point, which is finite, and whether the point is inside.
 pub(crate) fn around<const N: usize>(
     tree: &WideTree<N>,
     point: [f32; 3],

@@ -13,14 +13,14 @@ use crate::geometry::triangle::TriangleBlock;
 use crate::tree::node::Child;
 use crate::tree::wide::WideTree;
 
-/// Where the leaves are.
+/// Addresses of the leaf blocks of a tree, for prefetching.
 pub(crate) struct LeafPlaces {
     /// By [`Child::leaf_kind`].
     kinds: [Blocks; 4],
     has_cutouts: bool,
 }
 
-/// Where the blocks of a kind are.
+/// Address and size of the blocks of a kind.
 #[derive(Clone, Copy)]
 struct Blocks {
     first: *const u8,

@@ -1,4 +1,4 @@
-//! Where the primitive of a hit lies in the tree. Trees have no table of their primitives: the ray finds the way again.
+//! Place of the primitive of a hit in the tree. Trees have no table of their primitives: the ray finds the way again.
 //!
 //! Plain scalar code: the boxes around one point are few.
 
@@ -16,7 +16,7 @@ use crate::tree::wide::WideTree;
 
 /// A primitive that was hit.
 pub(crate) struct Located {
-    /// Its normal there, in its own space.
+    /// Normal of the primitive at the hit, in the primitive's own space.
     pub normal: Option<Normal>,
     /// Index of its instance in [`WideTree::instances`].
     pub instance: Option<usize>,
@@ -44,7 +44,7 @@ where
         tfar: f32::INFINITY,
         ..*ray
     };
-    // Next to the diagonal of a quad rounding may tell the other half.
+    // Next to the diagonal of a quad rounding may give the other half.
     let half = half_at([hit.u, hit.v]);
     [half, 1 - half].into_iter().find_map(|half| {
         let sought = Sought {
@@ -59,10 +59,10 @@ where
     })
 }
 
-/// What is sought.
+/// The primitive to find.
 struct Sought<'a> {
     hit: &'a Hit,
-    /// Which half, if that is a quad.
+    /// Half to find, 0 or 1, if the primitive is a quad.
     half: usize,
     /// Interval of the ray that was hit.
     interval: (f32, f32),

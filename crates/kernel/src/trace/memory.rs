@@ -25,7 +25,7 @@ pub(crate) struct Memory {
     pub ahead: Ahead,
     /// Answers that are to become bits.
     pub answers: Vec<bool>,
-    /// Which rays of a batch packets have left over.
+    /// Indices of the rays of a batch that packets have left over.
     pub pending: Vec<u32>,
     /// Closest hits of queries that report surfaces; the answers are not used.
     pub hits: Vec<Option<Hit>>,
@@ -33,7 +33,7 @@ pub(crate) struct Memory {
     pub setups: Vec<RaySetup>,
     /// Rays of a batch that were brought together.
     pub rays: Vec<Ray>,
-    /// Their order.
+    /// Order of the rays of a batch, as sort keys.
     pub keys: Keys,
 }
 

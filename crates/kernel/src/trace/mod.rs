@@ -10,8 +10,8 @@
 //!    `deferred`: their hits of cut-outs; `leaf_places`: how leaves are prefetched.
 //! 6. `packet`: rays that go the same way, side by side.
 //! 7. `instrumented`: one ray after another, in any order (`pick`), while an observer counts or logs (`observe`).
-//! 8. `visit`: all hits of a ray, front to back; `several`: the nearest hits of many rays, in a stream; `conditional`: occlusion
-//!    under a `condition`.
+//! 8. `visit`: all hits of a ray, front to back; `several`: the nearest hits of many rays, in a stream; `conditional`:
+//!    occlusion under a `condition`.
 //! 9. `moving`: queries of trees that move, at the time of each ray.
 //! 10. `binary`: all nodes and hits of a ray in a binary tree.
 //!

@@ -1,7 +1,8 @@
 //! Queries at a time: occlusion and closest hits in trees that move, see [`crate::tree::motion`].
 //!
-//! Loops, stacks and leaf tests are the same as in static trees. A ray knows its share of the span, and interpolates the boxes of a node
-//! and the corners of a leaf before they are tested, and the transform of an instance before it is entered.
+//! Loops, stacks and leaf tests are the same as in static trees. A ray knows its share of the span, and interpolates the
+//! boxes of a node and the corners of a leaf before they are tested, and the transform of an instance before it is
+//! entered.
 
 use antumbra_simd::{Lanes, Simd, Width, WithSimd};
 
@@ -33,7 +34,7 @@ pub(crate) struct Timed<T> {
     share: f32,
 }
 
-/// What a query does with a triangle block.
+/// Operations of a query on one triangle block.
 pub(crate) trait BlockQuery: StreamQuery {
     fn block<S: Simd>(
         state: &mut Self::State,
@@ -44,7 +45,7 @@ pub(crate) trait BlockQuery: StreamQuery {
         filters: &Filters,
     );
 
-    /// As [`StreamQuery::leaf_in_stream`].
+    /// [`StreamQuery::leaf_in_stream`] for one block of triangles.
     fn block_in_stream<S: Simd>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
@@ -53,7 +54,7 @@ pub(crate) trait BlockQuery: StreamQuery {
         ray: &RaySetup,
     ) -> u32;
 
-    /// As [`StreamQuery::confirm`].
+    /// [`StreamQuery::confirm`] for one block of triangles.
     fn confirm_block<S: Simd>(
         _: &mut Self::State,
         _: &mut Stack<'_, Self::Item>,

@@ -61,7 +61,7 @@ impl Candidate {
     }
 }
 
-/// What is sought.
+/// Collector of near primitives: takes candidates and bounds the search.
 pub(crate) trait Seeker {
     /// Nothing farther away than this matters any more.
     fn limit(&self) -> f64;
@@ -159,7 +159,7 @@ impl Within {
             near.total_cmp(&far).then(a.ids().cmp(&b.ids()))
         });
         self.found.dedup_by_key(|candidate| candidate.ids());
-        // The nearer half of a quad stands for the quad.
+        // The nearer half of a quad represents the quad.
         let mut quads = BTreeSet::new();
         self.found.retain(|Candidate { id, inst_id, .. }| {
             quad_of(id.prim_id).is_none_or(|(quad, _)| quads.insert([*inst_id, id.geom_id, quad]))

@@ -41,7 +41,7 @@ pub(crate) trait Observer {
 pub(crate) struct NodeVisit<'a> {
     /// The node.
     pub node: usize,
-    /// Where the ray comes from; for the root of an object, the slot of the instance.
+    /// Slot from which the ray comes; for the root of an object, the slot of the instance.
     pub from: Place,
     /// Lanes whose boxes are hit, as bits.
     pub lanes: u32,

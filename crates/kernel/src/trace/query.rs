@@ -340,7 +340,7 @@ impl StreamQuery for Occlusion {
         ray: &RaySetup,
         filters: &Filters,
     ) -> bool {
-        // Another hit in the same leaf may have decided: a filter is not asked in vain.
+        // Another hit in the same leaf may have decided: then the filter is not called.
         if !*occluded {
             *occluded = hit.counts(QueryKind::Occluded, ray, filters);
             stack.clear_if(*occluded);
@@ -349,8 +349,8 @@ impl StreamQuery for Occlusion {
     }
 }
 
-/// Which hit is the closest? Goes front to back and drops what begins behind the best hit so far: when a better one
-/// is found, so that pops need no thought.
+/// Query for the closest hit. Goes front to back and drops what begins behind the best hit so far: when a better one is
+/// found, so that pops need no thought.
 pub(crate) struct Closest;
 
 impl Closest {

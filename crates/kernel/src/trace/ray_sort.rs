@@ -111,7 +111,7 @@ impl Grid {
     /// Place of a ray in the order. NaN counts as 0.
     #[inline(always)]
     pub fn place(&self, ray: &Ray) -> u32 {
-        /// Where the numbers between two floats are 1: adding it rounds, and the lower bits become the number.
+        /// Floats from 2²³ on are 1 apart: adding it rounds, and the lower bits become the number.
         const ROUND: f32 = (1u32 << 23) as f32;
         const LAST: f32 = ((1u32 << BITS) - 1) as f32;
         let mut place = 0;

@@ -64,8 +64,8 @@ impl Default for NearestHits {
     }
 }
 
-/// Which hits are the nearest? [`Closest`], where the last hit of a full list is the one to precede. Visits children in the
-/// order of occlusion, as few lists get full and nothing behind a hit can be left out before.
+/// Query for the nearest hits: [`Closest`], where the last hit of a full list is the one to precede. Visits children in
+/// the order of occlusion, as few lists get full and nothing behind a hit can be left out before.
 pub(crate) struct Nearest;
 
 /// Knowledge of a ray on its way.

@@ -61,7 +61,7 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
                 ChildKind::Inner(index) => {
                     let node = &bvh.nodes[index];
                     let limit = Q::limit(&state, ray);
-                    // Made anew for every node: kept, its vectors would be spilled around every leaf.
+                    // Computed again for every node: kept, its vectors would be spilled around every leaf.
                     let test = NodeTest::<S, N>::new(simd, fresh(ray));
                     let (mask, entry) = Q::step(&state, simd, bvh, index, &test, limit);
                     let next = Q::Item::push_pop(&mut stack, node, mask, entry);

@@ -5,9 +5,9 @@ use crate::tree::node::Child;
 /// Items that a stack must hold for nodes of `width` children on `depth` levels, counted from its bottom.
 ///
 /// One lies at the bottom. A node takes one item and pushes at most `width`, so no path holds more than
-/// `(width - 1) * depth + 1` above that, and one more, the exit from an instance. Pushes write `width` items at once and culling reads and writes
-/// [`LANES`], hence as many more. Overflow is impossible; were a tree deeper than it said, index checks would
-/// panic rather than corrupt memory.
+/// `(width - 1) * depth + 1` above that, and one more, the exit from an instance. Pushes write `width` items at once and
+/// culling reads and writes [`LANES`], hence as many more. Overflow is impossible; were a tree deeper than it said,
+/// index checks would panic rather than corrupt memory.
 pub(crate) fn stack_size(width: usize, depth: usize) -> usize {
     (width - 1) * depth + 3 + width.max(LANES)
 }
@@ -60,7 +60,7 @@ impl Item for u64 {
 /// Children still to visit, in a part of `items`.
 pub(crate) struct Stack<'a, T> {
     items: &'a mut [T],
-    /// Where the bottom item lies.
+    /// Index of the bottom item in `items`.
     base: usize,
     /// One above the top. Shorter than an index, so that nothing overflows when it is looked behind the top, and one check
     /// is enough.

@@ -21,7 +21,7 @@ pub(crate) type NodeMask<S, const N: usize> = <NodeLanes<S, N> as Lanes<N>>::Mas
 #[derive(Clone, Copy)]
 pub(crate) struct NodeTest<S: Width<N>, const N: usize> {
     pub slabs: NodeSlabs<S::Lanes>,
-    /// Which plane of an axis is the near one.
+    /// Near plane of each axis.
     pub near: [Side; 4],
 }
 

@@ -57,9 +57,9 @@ pub(crate) fn surface<const N: usize>(bvh: &WideTree<N>, ray: &Ray, found: &Loca
         let mut object = RaySetup::IDLE;
         let here = match placed {
             None => Some(ray),
-            // Triangles look at the hit alone.
+            // Triangles look only at the hit.
             Some(_) if [PrimKind::Triangle, PrimKind::Cutout].contains(&leaf.kind) => Some(ray),
-            // The ray as the primitive met it.
+            // The ray in the object, where the primitive was hit.
             Some(placed) => RaySetup::new(ray, bvh.reach).and_then(|world| {
                 let entered = placed.placement.enter(Scalar, &world, &mut object);
                 entered.map(|_| &*object)

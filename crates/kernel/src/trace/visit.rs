@@ -88,7 +88,7 @@ pub(crate) struct Ahead {
 struct Waiting {
     /// The child with its distance, as on stacks.
     item: u64,
-    /// Where it lies in [`Ahead::spaces`].
+    /// Index in [`Ahead::spaces`].
     space: u32,
 }
 

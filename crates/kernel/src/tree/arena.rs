@@ -102,7 +102,7 @@ impl<const N: usize> WideTree<N> {
         Ok(places)
     }
 
-    /// Where a tree will be that joins.
+    /// Places that the nodes and blocks of a tree will have when it joins.
     fn places_of(&self, tree: &Self) -> Result<TreePlaces, Error> {
         let limit = |what, found, limit| {
             if found > limit {
@@ -184,7 +184,7 @@ fn prim_bounds<B: LeafBlock>(blocks: &[B]) -> impl Iterator<Item = Aabb> {
 }
 
 impl<const N: usize> Node<N> {
-    /// The same boxes with other references. Empty slots stay empty.
+    /// A node with the same boxes and other references. Empty slots stay empty.
     fn relocated(&self, relocated: impl Fn(Child) -> Child) -> Self {
         Self {
             planes: self.planes,

@@ -1,4 +1,4 @@
-//! Costs of the steps of a traversal, for whoever predicts costs.
+//! Costs of the steps of a traversal, from which the cost of a tree is predicted.
 
 use crate::geometry::primitives::PrimKind;
 

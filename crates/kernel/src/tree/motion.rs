@@ -47,7 +47,7 @@ pub(crate) struct BlockMotion {
     corners: [[[f32; BLOCK]; 3]; 3],
 }
 
-/// What moves in a tree during a span. The tree itself is the tree of the start.
+/// Motion of nodes, blocks and instances during a span. The tree itself is the tree of the start.
 #[derive(Clone, Debug)]
 pub(crate) struct Motion<const N: usize> {
     /// For each node of the tree of the world. Objects do not change inside.
@@ -246,7 +246,7 @@ impl<const N: usize> WideTree<N> {
             }) => Some(index + 1),
             _ => None,
         });
-        // Blocks of the world come before those of objects.
+        // Blocks of the world come before blocks of objects.
         let count = of_world.max().unwrap_or(0);
         let mut ends = Vec::with_capacity(count);
         for block in &mut self.blocks.triangles[..count] {

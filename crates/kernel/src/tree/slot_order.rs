@@ -33,8 +33,8 @@ impl SlotOrder {
     }
 }
 
-/// The same order with places from `count` on, which are empty, at the end. Planned orders have them there; those made of a
-/// forged file or log may not.
+/// A slot order with the places from `count` on, which are empty, moved to the end. Planned orders have them there.
+/// Orders from a forged file or log may not.
 pub(super) fn occupied_first<const N: usize>(places: &[u8; N], count: usize) -> [u8; N] {
     let is_occupied = |place: &u8| usize::from(*place) < count;
     let mut sorted = *places;

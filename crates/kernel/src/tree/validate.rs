@@ -35,7 +35,7 @@ pub(crate) type LeafBoxes = [Vec<Aabb>; PrimKind::COUNT];
 pub(crate) fn block_box<B: LeafBlock>(block: &B) -> Aabb {
     let mut bounds = Aabb::EMPTY;
     for (axis, [low, high]) in block.planes().iter_mut().enumerate() {
-        // Empty lanes are NaN and stand behind others, so the first one of a pair stays.
+        // Empty lanes are NaN and come last, so the first one of a pair stays.
         for half in [4, 2, 1] {
             for lane in 0..half {
                 let [first, other] = [low[lane], low[lane + half]];

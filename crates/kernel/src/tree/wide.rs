@@ -37,7 +37,7 @@ pub(crate) struct WideTree<const N: usize> {
     pub depth: usize,
     /// How occlusion queries pick the next child.
     pub pick: Rule,
-    /// What moves; then nodes and leaves are at the start of a span.
+    /// Motion during a span, if anything moves. Nodes and leaves are then at the start of the span.
     pub motion: Option<Arc<Motion<N>>>,
 }
 
@@ -48,7 +48,7 @@ pub(crate) struct PlacedTree {
     pub placement: Placement,
     /// The root of its object.
     pub root: u32,
-    /// Its object, as users number them. In a tree from a file objects have new numbers.
+    /// Index of its object in the user's list. In a tree from a file objects have new numbers.
     pub object: u32,
     /// The transform as the user gave it, for queries about points. Rays never look at it.
     pub world_from_object: [[f32; 4]; 3],

@@ -1,8 +1,8 @@
 //! Groups: rays from many points in the same directions.
 //!
-//! Rays go in packets either way: in neighbouring directions from one point ([`fans`]), or in one direction from neighbouring
-//! points ([`Beams`]). Suns of a year are close together. Patches of a sky are not. Both ways are tried, and the one that does less
-//! work goes on.
+//! Rays go in packets either way: in neighbouring directions from one point ([`fans`]), or in one direction from
+//! neighbouring points ([`Beams`]). Suns of a year are close together. Patches of a sky are not. Both are tried, and the
+//! one that does less work goes on.
 
 use alloc::vec::Vec;
 
@@ -141,7 +141,7 @@ impl Tally {
         self.rays += u64::from(rays);
     }
 
-    /// So many rays were not tried in a packet.
+    /// Counts rays that were not tried in a packet.
     #[inline(always)]
     pub fn skip(&mut self, rays: u32) {
         self.work += u64::from(Self::ALONE * rays);
@@ -236,8 +236,8 @@ pub(super) struct Way<'a, const N: usize> {
     pub sheaves: &'a [Sheaf],
 }
 
-/// Traces the rays of a packet. The block of triangles that occluded others before is tested first. Returns the lanes whose rays
-/// nothing is in the way of, and those that are left to others.
+/// Traces the rays of a packet. The block of triangles that occluded others before is tested first. Returns the lanes
+/// whose rays nothing occludes, and the lanes that are left to others.
 #[inline(always)]
 pub(super) fn trace_packet<S: Simd + Width<N>, const N: usize>(
     simd: S,

@@ -166,7 +166,7 @@ pub(crate) struct Packets<'a, Q: PacketQuery, const N: usize> {
     /// Memory of a stack for this tree.
     pub stack: &'a mut [Q::Item],
     pub batch: &'a RayBatch<'a>,
-    /// As long.
+    /// One answer for each ray of the batch.
     pub answers: &'a mut [Q::Answer],
     /// Indices of the rays that are left are appended here.
     pub pending: &'a mut Vec<u32>,
@@ -355,7 +355,7 @@ fn find_occluders<S: Simd + Width<N>, const N: usize>(
     }
 }
 
-/// The rays that some of the triangles of a block occlude. Whoever is not active may be left out.
+/// The rays that some of the triangles of a block occlude, as bits. Rays outside of `active` may be left out.
 #[inline(always)]
 fn occluded<S: Simd, const N: usize>(
     simd: S,

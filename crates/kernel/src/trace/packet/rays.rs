@@ -2,10 +2,10 @@
 //!
 //! # Why no ray of a packet misses a box that matters
 //!
-//! Rays of a packet have directions of the same signs and intervals that begin at 0 or later. Say they are positive,
-//! and let `o⁻ <= o <= o⁺` and `r⁻ <= r <= r⁺` hold for their origins and reciprocal directions on an axis (the
-//! reciprocals are those that the rays are traced with: division is monotonic), and let `R` be the largest of theirs,
-//! in the words of [`crate::geometry::ray_setup`]. A node is tested with the distance `(p - o⁺) r⁻` of its near planes, lessened by
+//! Rays of a packet have directions of the same signs and intervals that begin at 0 or later. Say they are positive, and
+//! let `o⁻ <= o <= o⁺` and `r⁻ <= r <= r⁺` hold for their origins and reciprocal directions on an axis (the rays are
+//! traced with these reciprocals: division is monotonic), and let `R` be the largest of theirs, in the words of
+//! [`crate::geometry::ray_setup`]. A node is tested with the distance `(p - o⁺) r⁻` of its near planes, lessened by
 //! `32 u R r⁻`, and the distance `(q - o⁻) r⁺` of its far planes, increased by `32 u R r⁺`. Rounding adds at most
 //! `4.2 u R` times the reciprocal to either. A hit is at 0 or later and, on each axis, within `11 u R` of a point of the
 //! primitive, which is in the box.
@@ -260,7 +260,7 @@ impl Frustum {
         let clamp_least = Quarter::<S>::splat(simd, least_of_all * MIN_DIRECTION);
         let shallow = steepness(simd, most, clamp_most);
         let steep = steepness(simd, least, clamp_least);
-        // Nobody follows rays apart: they would meet everything between them.
+        // Rays that are far apart make no packet: it would visit everything between them.
         let spread = Self::largest(org_max - org_min);
         let turn = Self::largest(most - least);
         if !((spread < extent * MAX_SPREAD) & (turn < most_of_all * MAX_TURN)) {
