@@ -218,7 +218,7 @@ impl ScalarShape for CurveSegment {
         })
     }
 
-    /// On the axis.
+    /// Nearest point on the axis, not on the surface.
     fn near(&self, _: u32, place: &Place<'_>) -> Option<Near> {
         let [a, b] = self.ends.map(|end| place.in_world(end));
         let axis = minus(b, a);
@@ -229,7 +229,7 @@ impl ScalarShape for CurveSegment {
         Some(place.near(position, [share, 0.5]))
     }
 
-    /// Area of the cone.
+    /// Area of the cone: its circumference in the middle times the length of its axis.
     fn area(&self) -> f64 {
         let axis = self.axis();
         2.0 * PI * self.radius(0.5) * math::sqrt(dot(axis, axis))

@@ -80,7 +80,7 @@ impl Disk {
 }
 
 impl ScalarShape for Disk {
-    /// Rounded outwards.
+    /// Box around the disk, rounded outwards.
     fn bounds(&self) -> Aabb {
         let normal = self.normal.map(f64::from);
         let length2 = dot(normal, normal);

@@ -56,30 +56,30 @@ pub struct Functions {
 }
 
 impl Functions {
-    /// No functions.
+    /// A list without filters and shapes.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// With these filters of meshes.
+    /// Sets the filters of meshes, in the order that [`Functions`] describes.
     #[must_use]
     pub fn filters(self, filters: Vec<Arc<dyn Opacity>>) -> Self {
         Self { filters, ..self }
     }
 
-    /// With these shapes of user geometry.
+    /// Sets the shapes of user geometry, in the order that [`Functions`] describes.
     #[must_use]
     pub fn shapes(self, shapes: Vec<Arc<dyn UserGeometry>>) -> Self {
         Self { shapes, ..self }
     }
 
-    /// The filters of these meshes.
+    /// The filters of these meshes. Fails unless there is one for each.
     pub(crate) fn filters_of(&self, meshes: &[GeometryId]) -> Result<&[Arc<dyn Opacity>], Error> {
         one_each("filters", &self.filters, meshes)
     }
 
-    /// The shapes of these geometries.
+    /// The shapes of these geometries. Fails unless there is one for each.
     pub(crate) fn shapes_of(
         &self,
         geometries: &[GeometryId],

@@ -41,7 +41,7 @@ pub(crate) trait LeafBlock: Clone + Send + Sync {
     /// Whether all [`LeafBlock::occluders`] surely occlude the ray.
     const OCCLUDERS_ARE_SURE: bool = false;
 
-    /// How many lanes are occupied.
+    /// Number of occupied lanes.
     fn count(&self) -> usize;
 
     /// Name of the primitive in an occupied lane.
@@ -129,7 +129,7 @@ pub(crate) trait LeafBlock: Clone + Send + Sync {
     /// Normal at a hit in a lane.
     fn normal(&self, lane: usize, ray: &Ray, hit: &Hit) -> Option<Normal>;
 
-    /// Bounds of all lanes.
+    /// Boxes of all lanes as planes, `[axis][side][lane]`. Empty lanes are NaN.
     #[inline(always)]
     fn planes(&self) -> LanePlanes {
         let mut planes = [[[f32::NAN; BLOCK]; 2]; 3];

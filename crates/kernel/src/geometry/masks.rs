@@ -29,16 +29,16 @@ use crate::ray::INVALID_ID;
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Masks {
-    /// By `geom_id`, geometries that lie in the world itself.
+    /// Masks of the geometries that lie in the world itself, by `geom_id`.
     pub world: Vec<u32>,
-    /// By object and `geom_id`, geometries of objects. The same for all instances of an object.
+    /// Masks of the geometries of objects, by object and `geom_id`. All instances of an object share them.
     pub objects: Vec<Vec<u32>>,
-    /// By `inst_id`, instances.
+    /// Masks of the instances, by `inst_id`.
     pub instances: Vec<u32>,
 }
 
 impl Masks {
-    /// All bits everywhere.
+    /// Masks with all bits set for every geometry and instance.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
@@ -82,7 +82,7 @@ impl SceneMasks {
         all
     }
 
-    /// Other instances.
+    /// Replaces the instances, given as pairs of `inst_id` and object.
     pub fn place(&mut self, instances: impl Iterator<Item = (u32, u32)>) {
         self.objects.clear();
         for (inst_id, object) in instances {
@@ -111,7 +111,7 @@ impl SceneMasks {
     }
 }
 
-/// The mask of this number.
+/// Mask at an index of a list; all bits beyond its end.
 fn of(list: &[u32], index: u32) -> u32 {
     list.get(index as usize).copied().unwrap_or(u32::MAX)
 }

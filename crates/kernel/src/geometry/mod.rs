@@ -158,7 +158,7 @@ pub struct QuadMesh<'a> {
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sphere {
-    /// Centre.
+    /// Centre, in the coordinates of the world or of the object.
     pub center: [f32; 3],
     /// Radius. A sphere is dropped at build unless its radius is positive and finite and its centre is finite.
     pub radius: f32,
@@ -182,21 +182,21 @@ pub struct Sphere {
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Geometry<'a> {
-    /// Triangles.
+    /// A mesh of triangles.
     Triangles(TriangleMesh<'a>),
-    /// Quads.
+    /// A mesh of quads.
     Quads(QuadMesh<'a>),
     /// Spheres; the place in this list is the `prim_id`.
     Spheres(Cow<'a, [Sphere]>),
     /// Flat disks; the place in this list is the `prim_id`.
     Disks(Cow<'a, [Disk]>),
-    /// Thin curves of straight segments.
+    /// Thin curves as chains of straight segments.
     Curves(Curves<'a>),
     /// Primitives of which the user gives boxes and functions: see [`UserGeometry`].
     User {
-        /// Number of primitives: their `prim_id`s are those below.
+        /// Number of primitives. Their `prim_id`s go from 0 to `count - 1`.
         count: u32,
-        /// The boxes and functions.
+        /// Boxes and functions of all primitives.
         shape: Arc<dyn UserGeometry>,
     },
 }

@@ -124,9 +124,9 @@ pub(crate) struct Lengths<V> {
     pub magnitudes: [V; 3],
     /// The largest of them, `w` above.
     pub largest: V,
-    /// `1 / w`.
+    /// `1 / w`, the reciprocal of `largest`.
     pub shortest: V,
-    /// `R` above.
+    /// `R` as above: the largest coordinate of the origin, by magnitude, plus the scene extent.
     pub reach: V,
     /// `R / w`.
     span: V,
@@ -231,7 +231,7 @@ pub(crate) struct RaySetup {
     pub shear_org: [f32; 3],
     /// `dir_x / dir_z`, `dir_y / dir_z`, `-1 / dir_z` on those axes.
     pub shear: [f32; 3],
-    /// `R` above.
+    /// `R` as above: the largest coordinate of the origin, by magnitude, plus the scene extent.
     reach: f32,
     /// The instance in whose space this is, or [`INVALID_ID`].
     pub inst_id: u32,
@@ -256,7 +256,7 @@ impl RaySetup {
         inst_id: INVALID_ID,
     };
 
-    /// `R` above.
+    /// `R` as above: the largest coordinate of the origin, by magnitude, plus the scene extent.
     #[inline(always)]
     pub fn reach(&self) -> f32 {
         self.reach

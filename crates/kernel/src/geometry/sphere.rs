@@ -27,7 +27,7 @@ impl Sphere {
 }
 
 impl ScalarShape for Sphere {
-    /// Rounded outwards.
+    /// Box around the sphere, rounded outwards.
     fn bounds(&self) -> Aabb {
         Aabb {
             min: self.center.map(|x| (x - self.radius).next_down()),
@@ -61,7 +61,7 @@ impl ScalarShape for Sphere {
             .map(|t| [t, 0.0, 0.0])
     }
 
-    /// Outwards.
+    /// Normal that points outwards, not of unit length.
     fn normal(&self, ray: &Ray, hit: &Hit) -> Option<[f64; 3]> {
         Some(core::array::from_fn(|axis| {
             let to_org = f64::from(ray.org[axis]) - f64::from(self.center[axis]);

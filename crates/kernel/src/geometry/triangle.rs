@@ -26,7 +26,7 @@ use crate::ray::{Hit, INVALID_ID, Ray};
 #[derive(Clone, Debug)]
 #[repr(C, align(32))]
 pub(crate) struct TriangleBlock {
-    /// `[axis][corner][lane]`.
+    /// Coordinates, `[axis][corner][lane]`.
     pub corners: [[[f32; BLOCK]; 3]; 3],
     pub geom_ids: [u32; BLOCK],
     pub prim_ids: [u32; BLOCK],
@@ -77,7 +77,7 @@ impl TriangleBlock {
         core::array::from_fn(|corner| core::array::from_fn(|axis| self.corners[axis][corner][lane]))
     }
 
-    /// The corners on these axes.
+    /// Corners of all lanes on these axes, in this order.
     #[inline(always)]
     pub fn corners_on<S: Simd>(&self, simd: S, axes: [usize; 3]) -> Corners<Vector<S>> {
         let [xs, ys, zs] = [

@@ -101,10 +101,10 @@ impl Conditions<'_> {
 }
 
 impl<'a> Condition<'a> {
-    /// Everything counts.
+    /// Condition that every hit fulfils.
     pub const NONE: Condition<'static> = Condition::except(PrimId::NONE);
 
-    /// Everything but a primitive.
+    /// Condition that every hit fulfils but hits on one primitive.
     pub const fn except(excluded: PrimId) -> Self {
         Self {
             excluded,
@@ -155,7 +155,7 @@ impl<'a> Condition<'a> {
             }
     }
 
-    /// Whether a hit counts.
+    /// Whether a hit fulfils everything but `after`, which [`Condition::is_behind`] checks.
     pub fn counts(&self, hit: &Hit) -> bool {
         self.may_count(PrimId::from(*hit)) && self.accept.is_none_or(|accept| accept(hit))
     }

@@ -15,15 +15,15 @@ use crate::trace::visit::Ahead;
 /// so far needed.
 #[derive(Debug, Default)]
 pub(crate) struct Memory {
-    /// For children in a static order.
+    /// Stacks of children in a static order.
     pub children: Vec<u32>,
-    /// For children by distance.
+    /// Stacks of children with their distances.
     pub entries: Vec<u64>,
-    /// For the instrumented traversal.
+    /// Stack of the instrumented traversal.
     pub open: Vec<Open>,
-    /// For hits reported front to back.
+    /// Memory for hits that are reported front to back.
     pub ahead: Ahead,
-    /// Answers that are to become bits.
+    /// Answers that are to be packed into bits.
     pub answers: Vec<bool>,
     /// Indices of the rays of a batch that packets have left over.
     pub pending: Vec<u32>,

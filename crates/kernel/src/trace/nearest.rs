@@ -45,7 +45,7 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    /// By distance, then by ids.
+    /// Whether this candidate comes before another: by distance, then by ids.
     pub fn precedes(&self, other: &Self) -> bool {
         let rank = |one: &Self| (one.near.distance2, one.ids());
         rank(self) < rank(other)
@@ -55,7 +55,7 @@ impl Candidate {
         math::sqrt(self.near.distance2) as f32
     }
 
-    /// Instance, geometry, primitive.
+    /// Ids in the order of rank: instance, geometry, primitive.
     pub fn ids(&self) -> [u32; 3] {
         [self.inst_id, self.id.geom_id, self.id.prim_id]
     }
@@ -135,7 +135,7 @@ impl Seeker for Nearest {
     }
 }
 
-/// All primitives within a distance.
+/// Collector of all primitives within a distance.
 #[derive(Debug)]
 pub(crate) struct Within {
     within2: f64,
@@ -396,7 +396,7 @@ fn walk<S: Simd + Width<N>, const N: usize, const WORLD: bool>(
     }
 }
 
-/// Visits an object.
+/// Visits the tree of an object.
 #[inline(always)]
 fn object<S: Simd + Width<N>, const N: usize>(
     simd: S,

@@ -39,13 +39,13 @@ pub(crate) trait Observer {
 
 /// A ray at a node.
 pub(crate) struct NodeVisit<'a> {
-    /// The node.
+    /// Index of the node in the tree.
     pub node: usize,
     /// Slot from which the ray comes; for the root of an object, the slot of the instance.
     pub from: Place,
     /// Lanes whose boxes are hit, as bits.
     pub lanes: u32,
-    /// Lanes of the node.
+    /// Number of lanes of the node.
     pub width: usize,
     /// The ray in the space of the node.
     pub ray: &'a RaySetup,
@@ -68,7 +68,7 @@ impl Place {
     };
 }
 
-/// Sees nothing.
+/// Observer that ignores everything.
 #[cfg(feature = "lab")]
 pub(crate) struct Nothing;
 
@@ -86,7 +86,7 @@ pub struct Cost {
     pub prim_tests: u32,
 }
 
-/// Counts tests per ray.
+/// Observer that counts the tests of each ray.
 pub(crate) struct Counting<'a> {
     costs: &'a mut [Cost],
     current: usize,

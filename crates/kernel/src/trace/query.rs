@@ -26,7 +26,7 @@ use crate::tree::wide::WideTree;
 
 /// The decisions of a traversal. Every ray has a state of its own that grows as the ray goes on.
 pub(crate) trait Query {
-    /// An item on the stacks.
+    /// Item on the stacks: a child, with or without a distance.
     type Item: Children;
     /// The knowledge of a ray on its way.
     type State: Copy;
@@ -36,19 +36,19 @@ pub(crate) trait Query {
     /// The state of a ray that no query has begun for.
     const IDLE: Self::State;
 
-    /// A ray begins.
+    /// State with which a ray begins.
     #[inline(always)]
     fn begin(_: &Ray) -> Self::State {
         Self::IDLE
     }
 
-    /// A ray of a batch begins.
+    /// State with which a ray of a batch begins.
     #[inline(always)]
     fn begin_in(batch: &RayBatch<'_>, index: usize) -> Self::State {
         Self::begin(&batch.rays[index])
     }
 
-    /// A ray is at its end.
+    /// Answer of a ray that is at its end.
     fn finish(state: &Self::State) -> Self::Answer;
 
     /// The answer for a ray that can hit nothing.
@@ -83,7 +83,7 @@ pub(crate) trait Query {
         simd.prefetch_at(bvh.nodes.as_ptr().wrapping_add(index));
     }
 
-    /// A leaf is reached.
+    /// Tests a leaf that the ray has reached, and brings its state and stack up to date.
     fn leaf<S: Simd, const N: usize>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
@@ -245,7 +245,7 @@ fn improve_other<const N: usize>(
     on_leaf!(bvh, leaf, block => block.improve(LanesOf(lanes), ray, &bvh.filters, best))
 }
 
-/// Is there anything? Visits children by ascending slots and stops at the first occluder.
+/// Query whether anything is in the way. Visits children by ascending slots and stops at the first occluder.
 pub(crate) struct Occlusion;
 
 impl Query for Occlusion {

@@ -30,7 +30,7 @@ pub(crate) struct RayBatch<'a> {
 enum Places<'a> {
     /// One after another, from this one on.
     From(usize),
-    /// Anywhere behind the first number.
+    /// In the order of these keys, whose places count from the first number.
     Keys(usize, &'a [Key]),
 }
 
@@ -56,7 +56,7 @@ pub(crate) struct LocatedHit {
 }
 
 impl LocatedHit {
-    /// Index of no instance.
+    /// Value of [`LocatedHit::instance`] for a hit in the world itself.
     pub const WORLD: u32 = u32::MAX;
 }
 
@@ -117,7 +117,7 @@ impl<'a> RayBatch<'a> {
         Self { report, ..self }
     }
 
-    /// Some of the rays.
+    /// Part of the batch: the rays of a range.
     pub fn part(&self, range: Range<usize>) -> Self {
         Self {
             places: match self.places {

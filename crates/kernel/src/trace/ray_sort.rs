@@ -16,7 +16,7 @@ const BITS: u32 = 7;
 /// Values of a digit by which rays are sorted: few enough that the ends of all lists stay in the first cache.
 const DIGIT: usize = 1 << DIGIT_BITS;
 const DIGIT_BITS: u32 = 8;
-/// Digits of a place.
+/// Digits of the place of a ray.
 const DIGITS: usize = 3;
 const _: () = assert!(3 * BITS + 3 == DIGITS as u32 * DIGIT_BITS);
 
@@ -47,7 +47,7 @@ impl Key {
     }
 }
 
-/// Memory to sort in.
+/// Sort keys of rays, and memory to sort them in.
 #[derive(Debug, Default)]
 pub(crate) struct Keys {
     keys: Vec<Key>,
@@ -93,7 +93,7 @@ impl Keys {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Grid {
     low: [f32; 3],
-    /// Cells per length.
+    /// Cells per unit of length, on each axis.
     scale: [f32; 3],
 }
 

@@ -45,7 +45,7 @@ use crate::trace::step::NodeTest;
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::WideTree;
 
-/// Rays in flight.
+/// Rays in flight in one stream.
 const SLOTS: usize = 64;
 
 /// Node steps between prefetching a node and testing it. A node prefetched much earlier does not stay in the first
@@ -191,14 +191,14 @@ impl<Q: StreamQuery, const N: usize, const CAREFUL: bool> WithSimd<N>
 /// The slots, sorted by the kind of their next child.
 struct Arrivals {
     nodes: Slots,
-    /// Leaves of anything but cut-outs.
+    /// Slots at leaves of anything but cut-outs.
     leaves: Slots,
     cutouts: Slots,
-    /// Instances.
+    /// Slots at instances.
     entries: Slots,
-    /// Ends of instances.
+    /// Slots at the end of an instance.
     exits: Slots,
-    /// Ends of rays, or no ray yet.
+    /// Slots whose ray is at its end, or that have none yet.
     done: Slots,
 }
 

@@ -116,7 +116,7 @@ impl<const N: usize> WideTree<N> {
         before.iter().sum::<usize>() + leaf.index
     }
 
-    /// How many numbers [`WideTree::leaf_index`] gives.
+    /// Number of leaves of all kinds, the empty triangle block included.
     pub fn leaf_count(&self) -> usize {
         self.blocks.lens().iter().sum()
     }

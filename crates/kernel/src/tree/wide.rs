@@ -46,7 +46,7 @@ pub(crate) struct WideTree<const N: usize> {
 #[repr(C, align(64))]
 pub(crate) struct PlacedTree {
     pub placement: Placement,
-    /// The root of its object.
+    /// Index of the root node of its object.
     pub root: u32,
     /// Index of its object in the user's list. In a tree from a file objects have new numbers.
     pub object: u32,

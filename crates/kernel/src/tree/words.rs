@@ -54,7 +54,7 @@ impl Kind {
         }
     }
 
-    /// Name in errors.
+    /// Name of the kind in error messages.
     fn name(self) -> &'static str {
         match self {
             Self::Tree => "tree",
@@ -366,7 +366,7 @@ impl<'a> Words<'a> {
         self.words().map(|[word]| word)
     }
 
-    /// A word that counts something.
+    /// Reads a word that counts something.
     pub fn count(&mut self) -> Result<usize, Error> {
         self.word().map(|word| word as usize)
     }

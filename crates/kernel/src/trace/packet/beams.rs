@@ -18,13 +18,13 @@ pub(super) struct Beams<'a> {
     rows: &'a Rows<'a>,
     range: Range<usize>,
     rays: PacketRays,
-    /// `[axis][lane]`.
+    /// Normals of the rows, `[axis][lane]`.
     normals: [[f32; RAYS]; 3],
     /// Lanes of rows that have rays.
     lanes: u32,
-    /// Smallest and largest coordinates.
+    /// Smallest and largest coordinates of the points.
     corners: [[f32; 3]; 2],
-    /// The largest one by magnitude, and the scene extent.
+    /// Largest coordinate of a point, by magnitude, plus the scene extent.
     reach: f32,
     ends: [f32; 2],
     /// The largest component of a normal.

@@ -16,7 +16,7 @@ use crate::trace::packet::sheaf::Sheaf;
 use crate::trace::packet::{Luck, Occluded, Packet, find_occluders, guessed};
 use crate::tree::wide::WideTree;
 
-/// Points with their rays' intervals.
+/// Ray origins, one per row, with the intervals of their rays.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Rows<'a> {
     pub points: &'a [[f32; 3]],
@@ -166,7 +166,7 @@ impl Tally {
             > u128::from(other.work) * u128::from(self.rays)
     }
 
-    /// Recent rays count more.
+    /// Halves both counts, so that recent rays count more.
     fn fade(&mut self) {
         self.work /= 2;
         self.rays /= 2;

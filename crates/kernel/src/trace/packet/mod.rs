@@ -40,7 +40,7 @@ use crate::trace::stack::Stack;
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::WideTree;
 
-/// Fewer rays are left to others.
+/// Fewest rays that make a packet. Fewer are left to others.
 const FEW: u32 = 4;
 
 /// Whether packets have paid so far. A packet that does not pay costs about as much as one that does saves, so they
@@ -66,7 +66,7 @@ impl Luck {
         tries
     }
 
-    /// A group has been tried.
+    /// Counts a group that has been tried, and whether that paid.
     #[inline(always)]
     fn count(&mut self, paid: bool) {
         let change = if paid { 1 } else { -1 };
@@ -488,7 +488,7 @@ impl PacketQuery for Closest {
 struct BestOfLanes {
     /// Per lane, the distance beyond which nothing is of interest: negative in lanes without a ray.
     distances: [f32; RAYS],
-    /// The largest of them.
+    /// The largest of `distances`.
     limit: f32,
     /// Lanes with a hit, as bits.
     found: u32,

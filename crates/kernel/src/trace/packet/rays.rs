@@ -44,7 +44,7 @@ pub(crate) const MAX_SPREAD: f32 = 1.0 / 16.0;
 /// Largest difference of directions on an axis, relative to their largest component.
 pub(crate) const MAX_TURN: f32 = 0.25;
 
-/// A ray as a row.
+/// A ray as a row: origin, `tnear`, direction, `tfar`.
 #[inline(always)]
 pub(crate) fn row(ray: &Ray) -> Row {
     let [ox, oy, oz] = ray.org;
@@ -68,9 +68,9 @@ pub(crate) struct PacketRays {
     pub dir: [[f32; RAYS]; 3],
     pub tnear: [f32; RAYS],
     pub tfar: [f32; RAYS],
-    /// See [`crate::geometry::ray_setup::Lengths`].
+    /// Reciprocals of the largest components of the directions, see [`crate::geometry::ray_setup::Lengths`].
     pub shortest: [f32; RAYS],
-    /// Bit per lane.
+    /// Per axis, the lanes whose directions are negative, as bits.
     negative: [u32; 3],
     largest: [u32; 2],
     /// Lanes of rays that can hit something.

@@ -12,7 +12,7 @@ use crate::trace::packet::rays::{Frustum, Likeness, MAX_TURN, RAYS};
 pub(crate) struct Sheaf {
     /// `[axis][lane]`. Lanes without a direction repeat another one.
     pub dir: [[f32; RAYS]; 3],
-    /// See [`crate::geometry::ray_setup::Lengths`].
+    /// Reciprocals of the largest components, see [`crate::geometry::ray_setup::Lengths`].
     pub shortest: [f32; RAYS],
     /// Place of each direction in the list that it came from.
     pub columns: [u32; RAYS],
@@ -25,9 +25,9 @@ pub(crate) struct Sheaf {
     near: [Side; 4],
     /// Reciprocals of each direction, `[axis][lane]`.
     pub rdirs: [[f32; RAYS]; 3],
-    /// The largest magnitude of a component.
+    /// Largest magnitude of a component of the directions.
     pub largest: f32,
-    /// Least and most of `shortest`.
+    /// Smallest and largest of `shortest`.
     span: [f32; 2],
 }
 

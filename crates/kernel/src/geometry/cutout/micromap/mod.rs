@@ -51,7 +51,7 @@ pub(crate) struct MapRef(u32);
 impl MapRef {
     const PLACE_BITS: u32 = 30;
 
-    /// Nothing is known.
+    /// Micromap of unknown parts only.
     pub const UNKNOWN: Self = Self(0);
 
     /// The micromap that begins at this place; `None` if there are too many before it.
