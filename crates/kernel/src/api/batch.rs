@@ -176,7 +176,7 @@ impl<'a> Batch<'a> {
         Self { conditions, ..self }
     }
 
-    /// Order in which the rays are traced; [`RayOrder::AsGiven`] unless told otherwise.
+    /// Order in which the rays are traced. Default: [`RayOrder::AsGiven`].
     pub fn order(self, order: RayOrder) -> Self {
         Self { order, ..self }
     }
@@ -377,7 +377,8 @@ impl<'a> Batch<'a> {
         );
     }
 
-    /// Asks about the rays of a range, in pieces that threads share: so many rays at a time, unless they are sorted.
+    /// Runs `query` on the rays of `range`, in pieces that threads share: `chunk` rays each, or `piece_len` where rays
+    /// are sorted.
     pub(super) fn run_range<A: Copy + Default + Send>(
         &self,
         kind: QueryKind,
@@ -404,7 +405,7 @@ impl<'a> Batch<'a> {
         }
     }
 
-    /// Conditions of the rays, if hits have to meet any.
+    /// Conditions that hits must satisfy; `None` if there are none.
     pub(super) fn conditions(&self) -> Option<&Conditions<'a>> {
         (!self.conditions.are_none()).then_some(&self.conditions)
     }
@@ -415,7 +416,7 @@ impl<'a> Batch<'a> {
         if self.closed { ray.closed() } else { ray }
     }
 
-    /// Asks about the rays of a range on this thread.
+    /// Runs `query` on the rays of `range` on this thread, sorted by `grid` if there is one.
     fn piece<A: Copy + Default>(
         &self,
         memory: &mut Memory,

@@ -134,7 +134,7 @@ impl<'a> Build<'a> {
         Ok(Object::new(self.learned(&primitives)?, &primitives))
     }
 
-    /// Builds the binary tree alone, from which trees are made for several recipes or lists of rays. Of the recipe only
+    /// Builds only the binary tree, from which trees are made for several recipes or lists of rays. Of the recipe only
     /// builder, training and clock count here.
     ///
     /// # Errors

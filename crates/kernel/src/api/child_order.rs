@@ -90,7 +90,7 @@ impl ChildOrder {
     }
 }
 
-/// A child as seen from its node, so that it is the same wherever the tree stands.
+/// A child relative to its node, which does not depend on where the tree is in the list of nodes.
 fn from_here(child: Child, node: usize) -> Child {
     match child.kind() {
         ChildKind::Inner(index) => Child::inner(index - node),
@@ -158,7 +158,7 @@ impl Bvh {
         self.adopt_from(0, order);
     }
 
-    /// [`Bvh::relearn`]; the order holds what stands at a node and behind it.
+    /// [`Bvh::relearn`]. The order returned covers the nodes from `first` on.
     pub(super) fn relearn_from(
         &mut self,
         first: usize,
@@ -175,7 +175,7 @@ impl Bvh {
         )
     }
 
-    /// [`Bvh::adopt`], for an order of what stands at a node and behind it.
+    /// [`Bvh::adopt`], for an order whose nodes are counted from `first`.
     pub(super) fn adopt_from(&mut self, first: usize, order: &ChildOrder) {
         on_tree!(&mut self.tree, tree => order.apply(tree, first));
     }

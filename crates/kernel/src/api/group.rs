@@ -74,8 +74,8 @@ impl Directions {
 /// Rays from points in directions: a row for each point, a column for each direction. Made by [`Bvh::group`]; nothing happens
 /// before the last call.
 ///
-/// Every answer equals [`Bvh::occluded`] for the ray. Order changes the cost alone: points should be near the ones before and
-/// after them, as the vertices of a surface are. Directions may be in any order.
+/// Every answer equals [`Bvh::occluded`] for the ray. Order changes only the cost: points should be near the ones
+/// before and after them, as the vertices of a surface are. Directions may be in any order.
 ///
 /// ```
 /// # use antumbra::{Bvh, Directions, Geometry, Recipe};
@@ -162,8 +162,8 @@ impl<'a> Group<'a> {
         self.directions.len().div_ceil(64)
     }
 
-    /// Which rays nothing is in the way of, one bit each: bit `j % 64` of word `j / 64` of row `i` is that of point `i` and
-    /// direction `j`. Bits behind the last column become 0.
+    /// Finds the rays that nothing is in the way of and sets one bit for each. Bit `j % 64` of word `j / 64` of row `i`
+    /// belongs to point `i` and direction `j`. Bits behind the last column become 0.
     ///
     /// Rows of points that are not finite, and of intervals that begin or end at NaN, are 0. In an empty interval nothing is in
     /// the way.
@@ -255,7 +255,8 @@ impl Bvh {
         }
     }
 
-    /// Tells which of these rays nothing is in the way of. Packets may have given them up.
+    /// Reports row and column of each pending ray that nothing is in the way of. Many rays that packets have given up
+    /// are traced as a stream.
     fn open_alone(
         &self,
         memory: &mut Memory,

@@ -16,7 +16,7 @@ use crate::trace::visit::Visit;
 /// Rays that one thread takes at a time. A visit takes longer than other queries.
 const CHUNK: usize = 1 << 10;
 
-/// Hits of many rays, one list after the other: those of ray `i` are `hits[splits[i]..splits[i + 1]]`.
+/// Hits of many rays, one list after the other. The list of ray `i` is `hits[splits[i]..splits[i + 1]]`.
 ///
 /// ```
 /// # use antumbra::{Bvh, Geometry, Recipe};
@@ -108,7 +108,7 @@ impl Batch<'_> {
         joined
     }
 
-    /// Hits in lists as threads found them, and where those of each ray lie.
+    /// Hits in lists as threads found them. `places` receives where the hits of each ray are.
     #[cfg(feature = "std")]
     fn hits_in_pieces(&self, places: &mut [Place]) -> Vec<Vec<Hit>> {
         let lists = Mutex::new(Vec::new());

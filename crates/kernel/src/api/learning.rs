@@ -88,12 +88,12 @@ impl Bvh {
         }
     }
 
-    /// Empty log for this tree. `seed` starts the shuffling, if the kind asks for it.
+    /// Empty log for this tree. `seed` starts the shuffling, if the kind shuffles.
     pub(crate) fn new_log(&self, kind: LogKind, seed: u64) -> Log {
         on_tree!(&self.tree, tree => Log::new(tree, kind, seed))
     }
 
-    /// Works out an order for a tree fresh from a collapse. [`Order::Simple`] leaves the tree as it is: in the
+    /// Computes an order for a tree fresh from a collapse. [`Order::Simple`] leaves the tree as it is: in the
     /// depth-first order of the binary tree, or in the order that the collapse learned.
     ///
     /// # Errors
@@ -109,7 +109,7 @@ impl Bvh {
     }
 
     /// Mean cost of an occlusion query by the paper's equation (1), `C_any` of the root, with chances estimated from
-    /// `log`: for the slots as they stand, or as `order` would put them.
+    /// `log`: for the slots as they are, or as `order` would put them.
     ///
     /// # Errors
     /// [`Error::OtherTree`] when the log or the order is of a tree of another shape.
@@ -135,7 +135,7 @@ impl Bvh {
         self.predicted_cost = None;
     }
 
-    /// Log of this kind of what `rays` meet in this tree. `seed` starts the shuffling, if the kind asks for it.
+    /// Log of this kind for `rays` in this tree. `seed` starts the shuffling, if the kind shuffles.
     pub(crate) fn log_of(&self, rays: &[Ray], kind: LogKind, seed: u64) -> Log {
         let mut log = self.new_log(kind, seed);
         let mut occluded = vec![false; rays.len()];
@@ -147,8 +147,8 @@ impl Bvh {
     /// Puts a tree fresh from its collapse into the order of a recipe, learned from `log` or else from `rays`. Where the
     /// order learns and there is neither, the tree stays as it is.
     ///
-    /// The [report](Bvh::report) tells how many rays were learned from, and the predicted cost before and
-    /// after. Returns the log if one was made, which counts the slots as they were.
+    /// The [report](Bvh::report) then has the number of rays learned from, and the predicted cost before and after.
+    /// Returns the log if one was made, which counts the slots as they were.
     ///
     /// # Errors
     /// [`Error::NeedsBoxes`], [`Error::NeedsMasks`] or [`Error::OtherTree`] if the log given does not suit.

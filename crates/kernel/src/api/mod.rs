@@ -1,4 +1,4 @@
-//! What users see first: a tree of any width, how it is made and how it is asked.
+//! The public interface: a tree of any width, how it is made and how it is queried.
 //!
 //! - `bvh`: the tree;  `recipe`: every choice that makes one;  `build`: making one in one call
 //! - `report`: what was built;  `times`: how long the steps took

@@ -77,11 +77,11 @@ impl ClosestPoint {
 
 /// Queries about points.
 ///
-/// Distances are those of surfaces: a point inside a sphere or a closed mesh is as far away as the surface is. Instances are
-/// measured in the world, whatever their transforms: corners are placed first, and spheres become ellipsoids.
-/// Distances are computed in double precision and compared so. The `f32` returned is the distance rounded once. So
-/// answers are the same bits for every tree, one by one and in batches. Partly transparent triangles count as if they were
-/// opaque. A quad is nearest where the nearer of its two triangles is, and counts once.
+/// Distances are measured to surfaces: a point inside a sphere or a closed mesh is as far away as the surface is.
+/// Instances are measured in the world, whatever their transforms: corners are placed first, and spheres become
+/// ellipsoids. Distances are computed and compared in double precision. The `f32` returned is the distance rounded
+/// once. So answers are the same bits for every tree, one by one and in batches. Partly transparent triangles count as
+/// if they were opaque. A quad is nearest where the nearer of its two triangles is, and counts once.
 ///
 /// [User geometry](crate::UserGeometry) answers by [`UserGeometry::closest_point`](crate::UserGeometry::closest_point).
 /// Queries for distances panic when they come to a primitive without it. No point is inside user geometry.
@@ -189,7 +189,7 @@ impl Bvh {
     ///
     /// The sign is as exact as [`Bvh::contains`]: for bodies whose edges are each shared by an even number of triangles. A
     /// surface with holes, a disk or user geometry has a distance, but no inside: near them, the sign means little.
-    /// Where bodies overlap, the distance is that of the nearest surface, even if that is inside another body.
+    /// Where bodies overlap, the distance is measured to the nearest surface, even if that is inside another body.
     ///
     /// ```
     /// # use antumbra::{Bvh, Geometry, Recipe, Sphere};

@@ -1,5 +1,5 @@
-//! Whether batches ask for nodes and leaves before their turn: what pays depends on the tree, the rays and the caches of
-//! the machine, so it can be tried.
+//! Whether batches prefetch nodes and leaves. What pays depends on the tree, the rays and the caches of the machine, so
+//! it can be timed.
 //!
 //! The requests are a fifth of the instructions of a node step (AVX2), for nothing if the tree stays in the first cache. Trees of 30
 //! thousand to two million triangles are 1.03 to 1.43 times as fast with them (`docs/src/performance.md`).
@@ -22,7 +22,7 @@ const CHUNK: usize = 256;
 const GAIN: f64 = 1.03;
 
 impl Bvh {
-    /// Has batches prefetch or not, as the recipe wants or as a short timing of `rays` tells.
+    /// Has batches prefetch or not: as the recipe says, or else as a short timing of `rays` by its clock decides.
     pub(crate) fn choose_prefetch(&mut self, rays: &[Ray], recipe: &Recipe) {
         match (recipe.prefetch, recipe.clock) {
             (Some(prefetch), _) => self.set_prefetch(prefetch),
@@ -37,18 +37,17 @@ impl Bvh {
         }
     }
 
-    /// Has batches ask for nodes and leaves before their turn, or not, from now on.
+    /// Has batches prefetch nodes and leaves from now on, or not.
     pub(crate) fn set_prefetch(&mut self, prefetch: bool) {
         self.prefetch = prefetch;
     }
 
-    /// Tries on `rays`, as occlusion queries on the calling thread, whether batches are faster with or without asking for
-    /// nodes and leaves before their turn; keeps to what is faster and returns it. `clock` tells the time that has passed since
-    /// some moment: the kernel has no clock.
+    /// Times `rays`, as occlusion queries on the calling thread, with and without prefetching of nodes and leaves.
+    /// Keeps what is faster and returns it. `clock` returns the time that has passed since some moment: the kernel has
+    /// no clock.
     ///
-    /// A few thousand rays like those to come will do; rays met for the first time tell more than ones that were just
-    /// traced. With fewer than 512 there is nothing to be told, and a clock that stands still tells nothing either: then all
-    /// stays as it is.
+    /// A few thousand rays like the ones to come are enough. Rays traced for the first time say more than rays that
+    /// were just traced. With fewer than 512 rays, or a clock that does not advance, the setting stays as it is.
     pub(crate) fn time_prefetch(&mut self, rays: &[Ray], clock: impl Fn() -> Duration) -> bool {
         let before = self.prefetch;
         let mut memory = Memory::default();
@@ -122,7 +121,7 @@ mod tests {
             ([150, 100, 150, 100], false, true),
             ([101, 100, 100, 101], false, true),
             ([90, 100, 100, 100], false, true),
-            // A clock that stands still.
+            // A clock that does not advance.
             ([0, 0, 0, 0], true, true),
             ([0, 0, 0, 0], false, false),
         ] {
@@ -136,7 +135,7 @@ mod tests {
             bvh.occluded_batch(&rays, &mut occluded);
             assert_eq!(occluded, answers);
         }
-        // Too few to tell.
+        // Too few for a decision.
         bvh.set_prefetch(true);
         let few = &rays[..2 * CHUNK - 1];
         assert!(bvh.time_prefetch(few, || panic!("nothing to time")));

@@ -29,7 +29,7 @@ use crate::tree::any::on_tree;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RayOrder {
-    /// As they are given. Best if neighbouring rays begin near each other, as those of a picture or of a surface do.
+    /// As they are given. Best if neighbouring rays begin near each other, as the rays of a picture or of a surface do.
     #[default]
     AsGiven,
     /// As they are given, where neighbours begin near each other and go the same way: what occluded the rays before is tested
@@ -39,12 +39,12 @@ pub enum RayOrder {
     /// costs up to half of the rate.
     Sorted,
     /// Sorted if all of this holds, and as given otherwise:
-    /// - The query asks for closest hits.
+    /// - The query is for closest hits.
     /// - Each thread has 2¹⁷ rays or more.
     /// - The tree takes 16 MiB or more, and so does not stay in the caches of a core.
     /// - Of 1024 rays, more than half begin farther from the next ray than 1/64 of the longest side of the scene's bounds.
-    /// - Of the same 1024 rays, three of four hit a primitive that no other of them hits. Otherwise rays meet few parts of
-    ///   the tree, and these stay in the caches.
+    /// - Of the same 1024 rays, three of four hit a primitive that no other of them hits. Otherwise rays visit few
+    ///   parts of the tree, and these stay in the caches.
     ByRule,
 }
 
