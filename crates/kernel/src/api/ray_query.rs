@@ -86,7 +86,7 @@ impl Bvh {
         })
     }
 
-    /// Whether anything that meets a condition occludes a ray.
+    /// Whether anything that satisfies a condition occludes a ray.
     pub(super) fn occluded_when(&self, ray: &Ray, condition: &Condition<'_>) -> bool {
         if condition.is_none() {
             return self.occluded(ray);
@@ -94,7 +94,7 @@ impl Bvh {
         self.occluder_when(ray, condition).is_some()
     }
 
-    /// The first occluder found that meets a condition.
+    /// The first occluder found that satisfies a condition.
     pub(super) fn occluder_when(&self, ray: &Ray, condition: &Condition<'_>) -> Option<PrimId> {
         self.with_stack(|stack: &mut [u32]| {
             on_tree!(&self.tree, bvh => {
@@ -103,7 +103,7 @@ impl Bvh {
         })
     }
 
-    /// The closest hit that meets a condition, given the closest one of all.
+    /// The closest hit that satisfies a condition, given the closest one of all.
     pub(super) fn closest_when(
         &self,
         ray: &Ray,
@@ -116,7 +116,7 @@ impl Bvh {
         self.visit_when(ray, condition, &mut |_| Visit::Accept)
     }
 
-    /// Calls `visit` with the hits that meet a condition, front to back.
+    /// Calls `visit` with the hits that satisfy a condition, front to back.
     pub(super) fn visit_when(
         &self,
         ray: &Ray,
@@ -170,7 +170,7 @@ impl<'a> RayQuery<'a> {
         }
     }
 
-    /// Counts hits at either end of the interval as well: asks about [`Ray::closed`].
+    /// Counts hits at either end of the interval as well: queries [`Ray::closed`].
     pub fn closed(self) -> Self {
         Self {
             ray: self.ray.closed(),
@@ -199,7 +199,8 @@ impl<'a> RayQuery<'a> {
         }
     }
 
-    /// Counts only hits for which `filter` returns true, a decision of this query alone, with all data that the closure has.
+    /// Counts only hits for which `filter` returns true. The filter belongs only to this query, and may use all data
+    /// that the closure has.
     ///
     /// The filter must decide the same about the same hit: then the answer does not depend on the tree. It is called with
     /// hits that count for all other conditions, in no defined order, and may be called with a hit twice.
@@ -257,10 +258,10 @@ impl<'a> RayQuery<'a> {
     ///
     /// So the first hit that is accepted is the closest one that counts. Nothing behind the end of the visit is looked at.
     ///
-    /// Hits come by ascending (t, inst_id, geom_id, prim_id), whatever the tree, and each primitive comes once for every
-    /// instance of it. Of a sphere that is the nearer of its two points inside the interval. Each triangle of a quad comes by
-    /// itself. Filters of cut-outs are asked
-    /// first, as by [`Bvh::intersect`]. They may be asked about hits that `visit` then does not come to.
+    /// Hits come by ascending (t, inst_id, geom_id, prim_id), whatever the tree, and each primitive comes once for
+    /// every instance of it. A sphere comes with the nearer of its two points inside the interval. Each triangle of a
+    /// quad comes by itself. Filters of cut-outs are called first, as by [`Bvh::intersect`]. They may be called for
+    /// hits that `visit` is then not called with.
     ///
     /// May be called from any number of threads at once, and from within `visit`. Memory comes from a pool of the tree.
     ///

@@ -60,8 +60,8 @@ pub struct Recipe {
 pub struct Training {
     /// Which rays are learned from.
     pub rays: TrainingRays,
-    /// Number of surface rays, synthetic rays between surfaces; `None` for a number that suits the size of the scene, 0 to
-    /// learn from areas alone.
+    /// Number of surface rays, synthetic rays between surfaces. `None` is a number that suits the size of the scene, 0
+    /// learns only from areas.
     pub surface_rays: Option<usize>,
     /// Seed of everything random in learning.
     pub seed: u64,
@@ -80,12 +80,12 @@ pub struct Training {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum TrainingRays {
-    /// The rays given alone. A tree for one kind of rays can be slow for others.
+    /// Only the rays given. A tree for one kind of rays can be slow for others.
     Given,
-    /// Surface rays alone: synthetic rays between surfaces.
+    /// Only surface rays: synthetic rays between surfaces.
     Surface,
-    /// Both, so that no kind of rays loses much: nodes from as many of each or more of those given, the child order from one
-    /// surface ray for four that are given. Surface rays alone where none are given.
+    /// Both, so that no kind of rays loses much. For the nodes, the rays given weigh at least as much as all surface
+    /// rays. The child order learns from one surface ray for four rays given. Only surface rays where none are given.
     #[default]
     Both,
 }

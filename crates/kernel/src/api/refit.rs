@@ -8,16 +8,17 @@ use crate::tree::any::on_tree;
 use crate::tree::costs::CostModel;
 
 impl Bvh {
-    /// Moves the primitives of the tree: `geometries` are those it was built over, with other vertices, or spheres of
-    /// other centres and radii, or user geometry, whose boxes are asked for anew and whose functions are replaced.
+    /// Moves the primitives of the tree. `geometries` are the ones that it was built over, with other vertices, or
+    /// spheres of other centres and radii, or user geometry. Boxes of user geometry are requested again, and its
+    /// functions are replaced.
     ///
-    /// Nodes, collapse and child order stay. Answers are those of a tree built anew over `geometries`, bit for bit.
-    /// [`Bvh::quality`] tells what the old nodes cost. Far cheaper than a build, and shared among the threads of
-    /// the current rayon pool.
+    /// Nodes, collapse and child order stay. Answers equal the answers of a tree built from scratch over `geometries`,
+    /// bit for bit. [`Bvh::quality`] returns what a query in the old nodes costs, relative to the build. A refit is far
+    /// cheaper than a build, and shared among the threads of the current rayon pool.
     ///
     /// A tree of the laboratory's builder `sbvh` has some triangles in several leaves, each with a box around a part
     /// of it. After a refit each of these boxes is around the whole triangle, so such a tree loses more than others.
-    /// Filters of cut-outs stay those of the build.
+    /// Filters of cut-outs stay as they were at the build.
     ///
     /// ```
     /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
@@ -58,8 +59,9 @@ impl Bvh {
         Ok(())
     }
 
-    /// Expected cost of a ray now over that when the tree was built, by the surface area heuristic: 1 before any
-    /// [refit](Bvh::refit), and more the worse the nodes suit what has moved. From about 1.5 on, a build soon pays.
+    /// Expected cost of a ray now over the expected cost when the tree was built, by the surface area heuristic: 1
+    /// before any [refit](Bvh::refit), and more the worse the nodes suit what has moved. From about 1.5 on, a build soon
+    /// pays.
     ///
     /// Walks all nodes.
     #[must_use]

@@ -21,7 +21,7 @@ use crate::tree::costs::CostModel;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct BuildReport {
-    /// Primitives in the tree; those of an object once, however often it is placed.
+    /// Primitives in the tree. Primitives of an object count once, however often it is placed.
     pub primitives: usize,
     /// Partly transparent triangles among them: see [`crate::cutout::Opacity`].
     pub cutouts: usize,
@@ -38,14 +38,13 @@ pub struct BuildReport {
     pub nodes: usize,
     /// Leaf blocks.
     pub leaves: usize,
-    /// Levels of nodes; the root is one. With instances, those of the world's tree and of the deepest object
-    /// together.
+    /// Levels of nodes; the root is one. With instances, levels of the world's tree and of the deepest object together.
     pub depth: usize,
     /// Bytes of nodes, leaf blocks and instances.
     pub bytes: usize,
-    /// Cost of a random line that hits the box of the root, by the surface area heuristic: what nodes and
-    /// primitives cost in the default [`crate::recipe::CostModel`], times their area relative to the root's. The cost of
-    /// the root alone if that has no area.
+    /// Cost of a random line that hits the box of the root, by the surface area heuristic: what nodes and primitives
+    /// cost in the default [`crate::recipe::CostModel`], times their area relative to the root's. Only the cost of the
+    /// root if the root has no area.
     pub sah: f64,
     /// Mean cost of an occlusion query by the paper's equation (1), estimated from the training log in units of the
     /// recipe's costs. `None` without a log, and for an order that picks by ray.

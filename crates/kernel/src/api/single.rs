@@ -65,15 +65,14 @@ impl Bvh {
         self.one::<Closest>(ray)
     }
 
-    /// Geometric normal at a hit, in the world and of length 1. `ray` is the ray that was asked, and `hit` its hit.
+    /// Geometric normal at a hit, in the world and of length 1. `ray` is the ray of the query, and `hit` its hit.
     ///
     /// A triangle's corners turn counter-clockwise if the normal points at the viewer; a mirroring instance turns it around
-    /// as it does the corners. A sphere's normal points outwards. The normal of either does not depend on the side that was
-    /// hit. User geometry tells its own: [`UserGeometry::normal`](crate::UserGeometry::normal).
+    /// as it does the corners. A sphere's normal points outwards. The normal of either does not depend on the side that
+    /// was hit. User geometry computes its own: [`UserGeometry::normal`](crate::UserGeometry::normal).
     ///
-    /// Finds the primitive by its ids along the ray, which takes about as long as a query of one ray. `None` if the ray comes by
-    /// no such primitive, if the three corners lie on a line, or if user
-    /// geometry tells none.
+    /// Finds the primitive by its ids along the ray, which takes about as long as a query of one ray. `None` if the ray
+    /// comes by no such primitive, if the three corners lie on a line, or if user geometry returns none.
     ///
     /// ```
     /// # use antumbra::{Bvh, Geometry, Ray, Recipe};

@@ -1,4 +1,4 @@
-//! The stage between geometry and a tree that answers rays: a binary tree, and the log of what training rays meet in it.
+//! The stage between geometry and a tree that answers rays: a binary tree, and the log of training rays in it.
 //!
 //! The steps are always the same: binary tree, training log of the binary tree, collapse, training log of the wide
 //! tree, child order, prefetching. [`Build`](super::build::Build) takes them all. [`Stage`] stops in between for those
@@ -102,13 +102,13 @@ impl Stage {
         &self.binary.tree
     }
 
-    /// Log of what the training rays of a recipe meet in the binary tree.
+    /// Log of the training rays of a recipe in the binary tree.
     pub fn training_log(&self, rays: &[Ray], recipe: &Recipe) -> Cow<'_, TreeLog> {
         self.binary.training_log(&self.primitives, rays, recipe)
     }
 
-    /// Wide tree for the rays of a training log, or without one by areas alone. A thorough search for a learned collapse
-    /// takes two starts, which pays for rays that are known.
+    /// Wide tree for the rays of a training log, or without one for areas only. A thorough search for a learned
+    /// collapse takes two starts, which pays for rays that are known.
     ///
     /// # Panics
     /// If the log was made for another tree.
@@ -117,7 +117,7 @@ impl Stage {
     }
 }
 
-/// Tells a monitor how far a build is.
+/// Reports to a monitor how far a build is. [`Error::Cancelled`] if the monitor stops the build.
 pub(super) fn reached(done: f32, monitor: &dyn BuildMonitor) -> Result<(), Error> {
     monitor.progress(done);
     if monitor.cancelled() {
@@ -127,7 +127,7 @@ pub(super) fn reached(done: f32, monitor: &dyn BuildMonitor) -> Result<(), Error
     }
 }
 
-/// A [`Stage`] without its primitives, which are passed to every step and must be those of the first.
+/// A [`Stage`] without its primitives. Every step must be given the primitives of the first.
 #[derive(Debug)]
 pub(crate) struct BinaryStage {
     tree: BinaryTree,
@@ -136,10 +136,10 @@ pub(crate) struct BinaryStage {
     surface_log: OnceLock<SurfaceLog>,
 }
 
-/// What surface rays meet in the binary tree.
+/// Training log of surface rays in the binary tree.
 #[derive(Debug)]
 struct SurfaceLog {
-    /// How many a recipe asked for, see [`Training`](super::recipe::Training).
+    /// Number of rays that a recipe requested, see [`Training`](super::recipe::Training).
     count: Option<usize>,
     log: TreeLog,
     time: Duration,
@@ -211,7 +211,7 @@ impl BinaryStage {
         Cow::Owned(log)
     }
 
-    /// [`Stage::collapse`]. The time of the log is that of the surface rays' log, also where it was made before.
+    /// [`Stage::collapse`]. Its times include making the surface rays' log, even where the log was made before.
     pub fn collapse(
         &self,
         primitives: &Primitives,

@@ -1,7 +1,7 @@
 //! The ground of a world: a tree that lies in the world itself.
 //!
-//! Instances stand close to it, so a top level over its root would have boxes that overlap. It is taken apart into subtrees, and
-//! these are items of the top level beside the instances.
+//! Instances are close to it, so a top level over its root would have boxes that overlap. It is taken apart into
+//! subtrees, and these are items of the top level beside the instances.
 
 use alloc::vec::Vec;
 

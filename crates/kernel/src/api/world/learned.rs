@@ -16,7 +16,8 @@ use crate::tree::node::ChildKind;
 use crate::tree::wide::WideTree;
 
 impl World {
-    /// Learns the child order of everything again, for these rays in the world as it stands: see [`Bvh::relearn`](crate::Bvh::relearn).
+    /// Learns the child order of everything again, for these rays in the world as it is now: see
+    /// [`Bvh::relearn`](crate::Bvh::relearn).
     /// Returns the order for copies of the world.
     ///
     /// The order is kept until the next call. Where instances have moved, the top level keeps it by their places in the
@@ -39,7 +40,7 @@ impl World {
         self.ranks.clone_from(&order.ranks);
     }
 
-    /// The places of items in the top level as it stands.
+    /// The places of items in the top level as it is now.
     fn ranks_now<const N: usize>(&self, tree: &WideTree<N>) -> Ranks {
         let mut ranks = Ranks {
             ground: vec![0; self.ground.items.len()],

@@ -38,9 +38,9 @@ const CHUNK: usize = 256;
 
 /// A scene of objects placed by [`Instance`]s, which may move. [`World::fixed`] makes the tree of a scene in which nothing moves.
 ///
-/// Moving, adding and removing instances makes the top level anew, the nodes above the objects, and nothing else. So
-/// does [refitting](World::refit) objects, beside the objects themselves. Answers equal the answers of [`World::fixed`] over the
-/// same geometry, bit for bit.
+/// Moving, adding and removing instances builds the top level from scratch, which is the nodes above the objects, and
+/// nothing else. So does [refitting](World::refit) objects, beside the objects themselves. Answers equal the answers of
+/// [`World::fixed`] over the same geometry, bit for bit.
 ///
 /// A world keeps copies of the trees of its objects: they are built once for all worlds, and copied once for each.
 /// `objects` may be a list of `Object`, `&Object` or `Arc<Object>`.
@@ -72,7 +72,7 @@ pub struct World {
     placements: Vec<Option<Placement>>,
     /// Nodes of the top level.
     top_nodes: usize,
-    /// Nodes that there is room for before those of the ground and the objects.
+    /// Number of nodes that the top level has room for, before the nodes of the ground and the objects.
     top_room: usize,
     /// What the top level learned.
     ranks: Ranks,
@@ -141,7 +141,7 @@ impl World {
         Self::put_together(Some(ground), objects, instances)
     }
 
-    /// The tree over everything, to be asked.
+    /// The tree over everything, for queries.
     pub fn bvh(&self) -> &Bvh {
         &self.bvh
     }
@@ -179,8 +179,8 @@ impl World {
     /// without a ground, it has no primitives. If an object is given twice, the last one counts.
     ///
     /// # Errors
-    /// As [`Bvh::refit`] and [`World::set_instances`], and an index of an object out of range, which is told as of an
-    /// instance. All stays as it is then.
+    /// As [`Bvh::refit`] and [`World::set_instances`], and [`Error::ObjectOutOfRange`] for an index of an object that
+    /// is out of range. All stays as it is then.
     pub fn refit(
         &mut self,
         objects: &[(u32, &[Geometry<'_>])],
@@ -330,14 +330,14 @@ impl World {
         })
     }
 
-    /// What moves, in the order in which it stands in the tree, once each.
+    /// What moves, once each, in the order of the tree.
     fn check_moved<'a>(
         &self,
         objects: &[(u32, &'a [Geometry<'a>])],
     ) -> Result<Vec<(u32, Moved<'a>)>, Error> {
         let mut moved: Vec<_> = objects.to_vec();
         moved.reverse();
-        // The ground stands before all objects.
+        // The ground comes before all objects.
         moved.sort_by_key(|(object, _)| object.wrapping_add(1));
         moved.dedup_by_key(|(object, _)| *object);
         for (object, _) in &moved {
@@ -355,7 +355,7 @@ impl World {
         checked.into_iter().collect()
     }
 
-    /// Where an object stands in the tree, or the ground, and how many sound primitives it has.
+    /// Places of an object or of the ground in the tree, and how many sound primitives it has.
     fn places_of(&self, object: u32) -> (&TreePlaces, usize) {
         match object {
             Self::GROUND => (&self.ground.places, self.ground.kept),

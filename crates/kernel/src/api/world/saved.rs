@@ -143,7 +143,8 @@ fn read_ground<const N: usize>(
     Ok(ground)
 }
 
-/// Places of a tree with these nodes, whose blocks begin where those of the tree before end. Its leaves are among its blocks.
+/// Places of a tree with these nodes. Its blocks begin where the blocks of the tree before end. Its leaves are among
+/// its blocks.
 fn read_places<const N: usize>(
     words: &mut Words<'_>,
     tree: &WideTree<N>,
@@ -175,7 +176,7 @@ fn read_places<const N: usize>(
     }
 }
 
-/// The objects of a world, whose blocks begin where those of the ground end.
+/// The objects of a world, whose blocks begin where the blocks of the ground end.
 fn read_objects<const N: usize>(
     words: &mut Words<'_>,
     tree: &WideTree<N>,
