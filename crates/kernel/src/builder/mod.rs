@@ -88,11 +88,11 @@ impl Builder {
 
 /// Builds a tree over all primitives; empty for none. `rays` serve the builders that [need
 /// rays](Builder::needs_rays), all with the same weight; the others ignore them. Of more than 2¹⁴ rays an even
-/// selection is used. Without rays, and where hardly any come, the tree is that of [`Builder::BinnedSah`]. An object
-/// is built for the rays that enter its instances.
+/// selection is used. Without rays, and where hardly any come, the result is the tree of [`Builder::BinnedSah`]. An
+/// object is built for the rays that enter its instances.
 ///
-/// The tree does not depend on the number of threads. Of a build that `monitor` stops it is sound, but not what was asked
-/// for.
+/// The tree does not depend on the number of threads. If `monitor` stops the build, the tree is sound, but not the one
+/// that was requested.
 #[cfg_attr(
     not(feature = "lab"),
     expect(unused_variables, reason = "no builder needs rays")

@@ -7,8 +7,8 @@ use core::cmp::Reverse;
 
 use crate::aabb::Aabb;
 
-/// Takes a tree apart, the largest boxes first, into at least `count` subtrees or as many as there are leaves. `children`
-/// are those of an inner node; a leaf has none.
+/// Takes a tree apart, the largest boxes first, into at least `count` subtrees or as many as there are leaves.
+/// `children` returns the children of an inner node, and `None` for a leaf.
 pub(crate) fn take_apart<T: Copy, C: IntoIterator<Item = (T, Aabb)>>(
     root: (T, Aabb),
     count: usize,

@@ -1,9 +1,9 @@
-//! The top level of a world whose objects are trees already: wide nodes over boxes, made anew for every frame.
+//! The top level of a world whose objects are trees already: wide nodes over boxes, made from scratch for every frame.
 //!
 //! A node begins as one part of all items. The part with the largest box is divided by the surface area heuristic until
 //! there are as many parts as slots. A part of one item becomes the reference of the item, any other part a node.
-//! Children stand by falling area, or in the order that an earlier top level learned. One thread suffices for tens of thousands
-//! of items.
+//! Children are sorted by falling area, or in the order that an earlier top level learned. One thread suffices for tens
+//! of thousands of items.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -137,7 +137,7 @@ fn children<const N: usize>(items: &mut Items<'_>, part: Part, ranks: &[u32]) ->
     parts
 }
 
-/// The part of the largest box among those of so many items.
+/// Place of the part with the largest box, among the parts that have this many items.
 fn largest(parts: &[Part], lens: Range<usize>) -> Option<usize> {
     let mut largest = None;
     let mut largest_area = f32::NEG_INFINITY;

@@ -22,7 +22,7 @@ use crate::collapse::skeleton::{Children, Contraction, ForVisits};
 use crate::parallel::join;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 
-/// Subtrees of at most so many nodes are worked out by one thread.
+/// Subtrees of at most so many nodes are computed by one thread.
 const SEQUENTIAL: usize = 2048;
 
 /// For each binary node `x` and number of slots `k`, how many of them its left child is best given, in
@@ -101,7 +101,7 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The recursion for `node`; fills in `splits`, which are those of the node and of all below it.
+    /// The recursion for `node`. Fills in `splits`, which has an entry for the node and for each node below it.
     fn cheapest<const N: usize>(&self, node: usize, splits: &mut [[u8; N]]) -> Cheapest<N> {
         let Some([left, right]) = self.tree.children(node) else {
             return Cheapest::LEAF;
@@ -115,7 +115,7 @@ impl Search<'_> {
             return Dispatch::<8>::dispatch(self.isa, subtree);
         }
         let (own, below) = splits.split_first_mut().expect("begin at the node");
-        // Depth-first order: everything below the left child stands before the right one.
+        // Depth-first order: everything below the left child comes before the right one.
         let (below_left, below_right) = below.split_at_mut(right - left);
         let (left, right) = join(
             || self.cheapest(left, below_left),
@@ -135,8 +135,8 @@ struct Subtree<'a, 'b, const N: usize> {
 impl<const N: usize> WithSimd<8> for Subtree<'_, '_, N> {
     type Output = Cheapest<N>;
 
-    /// From the last node to the first, which meets children before their parents: a loop with a stack, because
-    /// a recursive function cannot be inlined and so not be compiled for the instruction set.
+    /// Goes from the last node to the first, so that children come before their parents. A loop with a stack, because a
+    /// recursive function cannot be inlined and so not be compiled for the instruction set.
     #[inline(always)]
     fn with_simd<S: Simd + Width<8>>(self, _: S) -> Cheapest<N> {
         let Self {
@@ -176,8 +176,8 @@ fn combine<const N: usize>(
     } else {
         (right, left)
     };
-    // `D(k)` in place `k - 1`. All places are worked out at once, as vectors; what is impossible is made
-    // infinite by what stands before the costs of the larger child.
+    // `D(k)` in place `k - 1`. All places are computed at once, as vectors; what is impossible is made infinite by what
+    // comes before the costs of the larger child.
     let mut padded = [[f32::INFINITY; N], large.costs];
     let padded = padded.as_flattened_mut();
     let mut divided = [f32::INFINITY; N];

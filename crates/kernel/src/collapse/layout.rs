@@ -51,9 +51,9 @@ pub(crate) struct Part<'a, const N: usize> {
     pub prim_hits: Option<Cow<'a, [f32]>>,
 }
 
-/// Writes the tree of the world and behind it those of the objects that there are. Slots are as the skeletons
-/// have them; primitives of a leaf by how often they were hit, if that is known. Nodes and blocks of each
-/// tree stand in visiting order, depth first.
+/// Writes the tree of the world and behind it the trees of the objects that exist. Slots are as the skeletons have
+/// them. Primitives of a leaf are sorted by how often they were hit, if that is known. Nodes and blocks of each tree
+/// are in visiting order, depth first.
 ///
 /// # Panics
 /// If there are more nodes or leaves than child references can name.
@@ -87,11 +87,11 @@ struct Job {
 
 /// Places of everything that is to be written.
 struct Plan<'a, const N: usize> {
-    /// The tree of the world, then those of the objects that there are.
+    /// The tree of the world, then the trees of the objects that exist.
     parts: Vec<&'a Part<'a, N>>,
-    /// The root of each of those objects.
+    /// The root of each object that exists.
     roots: Vec<u32>,
-    /// The root of each object; without meaning for those that are not there.
+    /// The root of each object. Without meaning for objects that do not exist.
     object_roots: Vec<u32>,
     nodes: Vec<Job>,
     /// Per node, what its slots refer to.
@@ -269,14 +269,14 @@ struct LeafPrims {
 }
 
 impl LeafPrims {
-    /// Primitives hit more often come first; where nobody knows, they stand as the binary tree has them.
+    /// Primitives hit more often come first. Without counts of hits, they keep the order of the binary tree.
     fn new(tree: &BinaryTree, leaf: u32, prim_hits: Option<&[f32]>) -> Self {
         let range = leaf_range(tree, leaf);
         let (first, len) = (range.start, range.len());
         let mut prims = [0; BLOCK];
         prims[..len].copy_from_slice(&tree.prims[range.clone()]);
         let hits = |place: usize| prim_hits.map_or(0.0, |hits| hits[place]);
-        // Most leaves are met by no ray of the log.
+        // Most leaves are visited by no ray of the log.
         if range.into_iter().any(|place| hits(place) > 0.0) {
             let mut places: [usize; BLOCK] = core::array::from_fn(|lane| first + lane);
             places[..len].sort_by(|&a, &b| hits(b).total_cmp(&hits(a)));

@@ -1,5 +1,5 @@
-//! From the binary tree to N children per node: which nodes stay, in which order they are visited, where
-//! they stand in memory.
+//! From the binary tree to N children per node: which nodes stay, in which order they are visited, where they are in
+//! memory.
 
 use alloc::vec::Vec;
 
@@ -25,9 +25,9 @@ use crate::tree::costs::CostModel;
 use crate::tree::wide::WideTree;
 use antumbra_simd::named_list;
 
-/// Weight of the area prior, as a share of the rays in the log: what no ray visited is collapsed by area,
-/// and an open scene does not fit the sampled rays alone. Anything from 0.01 to 1 gives the same visits
-/// within 1 % on four scenes; 0.5 does best for rays of another kind than those learned from.
+/// Weight of the area prior, as a share of the rays in the log: what no ray visited is collapsed by area, and an open
+/// scene does not fit only the sampled rays. Anything from 0.01 to 1 gives the same visits within 1 % on four scenes;
+/// 0.5 does best for rays of another kind than the training rays.
 const AREA_PRIOR: f32 = 0.5;
 
 named_list! {
@@ -71,7 +71,7 @@ impl Collapse {
         self.properties().needs_log
     }
 
-    /// Whether it puts children and primitives in a learned order, if a [`Learning`] asks for that.
+    /// Whether it puts children and primitives in a learned order, if a [`Learning`] wants that.
     pub(crate) fn sorts(self) -> bool {
         self.name() != "learned-unsorted"
     }
@@ -88,8 +88,8 @@ pub struct Learning {
     pub sort: bool,
     /// The costs that are minimised.
     pub model: CostModel,
-    /// Whether the learned collapse is searched for from two starts, which takes about three times as long as from one. For
-    /// rays that are known it is worth it, where many more will follow.
+    /// Whether the learned collapse is searched for from two starts, which takes about three times as long as from one.
+    /// The search pays for rays that are known, where many more will follow.
     pub thorough: bool,
 }
 
@@ -249,13 +249,13 @@ impl<'a> Rays<'a> {
         Self { tree, log, prior }
     }
 
-    /// How many of them visit each node. That depends on the order of children, and that on the collapse: at first
-    /// every ray is taken to visit what it hits, then what it would visit in the tree that this gives. Of the learned
-    /// collapse the second round saves 1 to 7 % of the visits, a third nothing.
+    /// How many of them visit each node. The visits depend on the order of children, and the order on the collapse. At
+    /// first every ray is taken to visit what it hits, then what it would visit in the tree that this gives. Of the
+    /// learned collapse the second round saves 1 to 7 % of the visits, a third nothing.
     ///
-    /// Where that ends depends on where it begins. A `thorough` search also begins with rays that visit what occludes them
-    /// alone, and goes on with what costs the rays of the log less: on sponza, 8 wide, that saves up to 18 % of the node
-    /// tests, elsewhere nothing to 2 %. Beginnings at random promise more by the model than they keep (up to 4 % more node
+    /// The result depends on the start. A `thorough` search also starts with rays that visit only what occludes them,
+    /// and keeps the result that costs the rays of the log less: on sponza, 8 wide, that saves up to 18 % of the node
+    /// tests, elsewhere nothing to 2 %. Random starts promise more by the model than they keep (up to 4 % more node
     /// tests on sibenik).
     fn visits<C: ForVisits<N>, const N: usize>(
         &self,
@@ -276,8 +276,8 @@ impl<'a> Rays<'a> {
         }
     }
 
-    /// How many of them visit each node in the tree for rays that visit nodes so often, and what those of the log cost there
-    /// below the root.
+    /// How many of them visit each node in the tree for rays that visit nodes so often, and what the rays of the log
+    /// cost there below the root.
     fn visits_if<C: ForVisits<N>, const N: usize>(
         &self,
         sorting: Sorting,

@@ -61,8 +61,8 @@ impl<const N: usize> Children<N> {
     }
 }
 
-/// A wide tree made of binary nodes. Its nodes stand in the depth-first order of the binary tree, whatever the
-/// order of their children.
+/// A wide tree made of binary nodes. Its nodes are in the depth-first order of the binary tree, whatever the order of
+/// their children.
 #[derive(Clone, Debug)]
 pub(crate) struct Skeleton<const N: usize> {
     pub nodes: Vec<SkeletonNode<N>>,
@@ -104,7 +104,7 @@ pub(crate) struct Sorting<'a> {
     /// Cost of the tree of each object that an instance may place.
     pub objects: &'a [f64],
     pub model: &'a CostModel,
-    /// Whether they are sorted; if not, only the cost is worked out.
+    /// Whether they are sorted; if not, only the cost is computed.
     pub sort: bool,
 }
 
@@ -165,7 +165,7 @@ impl<const N: usize> Skeleton<N> {
         levels.into_iter().max().unwrap_or(1)
     }
 
-    /// Rank of each binary leaf in visiting order; of an inner node, that of the first leaf below it.
+    /// Rank of each binary leaf in visiting order. An inner node has the rank of the first leaf below it.
     pub fn ranks(&self, tree: &BinaryTree) -> Vec<u32> {
         let mut ranks = vec![u32::MAX; tree.nodes.len()];
         let mut rank = 0;
@@ -291,7 +291,7 @@ impl Sorting<'_> {
         }
     }
 
-    /// Sorts the children of a node, which have these costs. Returns that of the node.
+    /// Sorts the children of a node, which have these costs. Returns the cost of the node.
     fn finish<const N: usize>(
         &self,
         tree: &BinaryTree,

@@ -1,8 +1,8 @@
 //! Leaf splitting: leaves that many training rays reach are divided where that spares more than it costs.
 //!
-//! Builders stop when primitives fit a leaf block. But a few large leaves of a scene, such as those of a floor or a lamp's
-//! shade, are entered by a good part of all rays, and most of these pass between the primitives. Dividing those few
-//! leaves hardly takes memory. `docs/notes/kernel.md` has measurements.
+//! Builders stop when primitives fit a leaf block. But a few large leaves of a scene, such as the leaves of a floor or
+//! a lamp's shade, are entered by a good part of all rays, and most of these pass between the primitives. Dividing
+//! those few leaves hardly takes memory. `docs/notes/kernel.md` has measurements.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -33,7 +33,7 @@ pub(crate) struct SplitLeaves {
 }
 
 impl SplitLeaves {
-    /// Splits leaves of a tree of at least one node. `visits` tells how many rays come to a node.
+    /// Splits leaves of a tree of at least one node. `visits` returns how many rays come to a node.
     pub fn new(primitives: &Primitives, tree: &BinaryTree, visits: impl Fn(usize) -> f32) -> Self {
         let leaves = || (0..tree.nodes.len()).filter(|&node| tree.children(node).is_none());
         let sum: f64 = leaves().map(|leaf| f64::from(visits(leaf))).sum();
@@ -49,7 +49,7 @@ impl SplitLeaves {
             shares: Vec::with_capacity(tree.nodes.len()),
             places: Vec::with_capacity(tree.prims.len()),
         };
-        // Where the nodes of the old tree stand in the new one.
+        // Where the nodes of the old tree are in the new one.
         let mut moved = Vec::with_capacity(tree.nodes.len());
         for (index, node) in tree.nodes.iter().enumerate() {
             moved.push(split.tree.nodes.len() as u32);

@@ -9,7 +9,7 @@ use super::{MAX_SAH_DEPTH, Measure, Part, divide};
 use crate::aabb::Aabb;
 use crate::builder::cost::ItemWeights;
 
-/// Items are halved by count from this many levels on. A top level stands above subtrees that are deep themselves.
+/// Items are halved by count from this many levels on. A top level is above subtrees that are deep themselves.
 const MAX_SAH_LEVELS: u32 = 48;
 
 /// Boxes of items in the order in which parts divide them.

@@ -4,8 +4,8 @@
 //! Source: Wald (2007), "On fast Construction of SAH-based Bounding Volume Hierarchies". Splitting stops
 //! when the primitives fit one leaf block, which is tested at one go. Large nodes are binned and
 //! partitioned by many threads in chunks; smaller ones are whole subtrees, each the work of one thread.
-//! All work is divided by counts of primitives alone, so the tree does not depend on the number of
-//! threads; and all arithmetic gives the same bits on every instruction set.
+//! All work is divided only by counts of primitives, so the tree does not depend on the number of threads; and all
+//! arithmetic gives the same bits on every instruction set.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -425,7 +425,7 @@ fn split<S: Simd, W: Weigh, const B: usize>(
     part.divided::<S, W>(simd, items, middle, bounds)
 }
 
-/// Splits by the heuristic between any two primitives; by count when they cannot be told apart.
+/// Splits by the heuristic between any two primitives; by count when the heuristic cannot distinguish them.
 #[inline(always)]
 fn sweep_split<S: Simd, W: Weigh>(
     simd: S,

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use crate::aabb::Aabb;
 use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 
-/// Stands above the root, which is its left child; there is no right one.
+/// The node above the root, which is its left child; there is no right one.
 pub(crate) const TOP: u32 = 0;
 
 /// No node.
@@ -241,8 +241,8 @@ impl LinkedTree {
         }
     }
 
-    /// Measures a node and those above it anew, after one of its children has changed. Returns the growth
-    /// of the sum of their areas.
+    /// Measures a node and the nodes above it again, after one of its children has changed. Returns the growth of the
+    /// sum of their areas.
     fn refit(&mut self, mut node: u32) -> f64 {
         let mut growth = 0.0;
         while node != TOP {
