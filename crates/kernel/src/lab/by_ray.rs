@@ -236,7 +236,7 @@ pub(crate) fn left_at(ray: &RaySetup, bounds: &Aabb) -> f32 {
     })
 }
 
-/// Sorts lanes so that the box that is left last stands at the end; of equal ones that of the lower slot.
+/// Sorts lanes so that the box that is left last comes last; of equal ones the box of the lower slot.
 fn sort_by_end<const N: usize>(ray: &RaySetup, node: &Node<N>, lanes: &mut [u32]) {
     let mut ends = [0.0; N];
     for &lane in lanes.iter() {

@@ -9,13 +9,13 @@
 //! ```
 //!
 //! where the sum of the probabilities is cut off at 1. That is exact where no ray is occluded below two children, and
-//! too low otherwise, by what the events overlap. [`Events::Overlapping`] therefore counts how many rays are occluded below
-//! both of two children, too, and takes off each probability the largest share of it that another child has
-//! (the bound of Hunter 1976 on a union of events, with a chain of the largest overlaps as its tree). A node needs `2 N²` counts. The cheapest order is found by
-//! [`arrange()`], exactly for up to eight children that occlude anything.
+//! too low otherwise, by what the events overlap. [`Events::Overlapping`] therefore counts how many rays are occluded
+//! below both of two children, too, and takes off each probability the largest share of it that another child has (the
+//! bound of Hunter 1976 on a union of events, with a chain of the largest overlaps as its tree). A node needs `2 N²`
+//! counts. The cheapest order is found by [`arrange()`], exactly for up to eight children that occlude anything.
 //!
-//! [`Events::Paired`] takes the same counts for a product, `Π (1 - P(j occludes | i is hit))`: children are independent of each other,
-//! but not of what they are asked by.
+//! [`Events::Paired`] takes the same counts for a product, `Π (1 - P(j occludes | i is hit))`: children are independent
+//! of each other, but not of whether the box of child i is hit.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -97,7 +97,7 @@ pub(crate) fn plan<const N: usize>(
     })
 }
 
-/// Cost of the root with the slots as they stand, by a model whose counts come from a log of masks.
+/// Cost of the root with the slots as they are, by a model whose counts come from a log of masks.
 pub(crate) fn predicted_cost<const N: usize>(
     bvh: &WideTree<N>,
     log: &Log,
@@ -257,7 +257,7 @@ impl<const N: usize> Costs for Arranged<'_, N> {
     }
 }
 
-/// Goes through the nodes bottom-up, asks `order` for the visiting order of each, and returns the cost of the root.
+/// Goes through the nodes bottom-up, gets the visiting order of each from `order`, and returns the cost of the root.
 fn walk<const N: usize>(
     bvh: &WideTree<N>,
     log: &RayLog,
@@ -282,7 +282,7 @@ fn walk<const N: usize>(
         *end += 1;
     }
     let mut costs = vec![0.0; bvh.nodes.len()];
-    // Children follow their parents, so going backwards meets them first.
+    // Children follow their parents, so going backwards visits them first.
     for (index, node) in bvh.nodes.iter().enumerate().rev() {
         let mut below = [0.0; N];
         for (slot, cost) in below.iter_mut().enumerate().take(node.len()) {
@@ -331,7 +331,7 @@ mod tests {
             .collect()
     }
 
-    /// Of events that exclude each other the model tells the cost exactly, and finds the cheapest of all orders.
+    /// For events that exclude each other the model computes the cost exactly, and finds the cheapest of all orders.
     #[test]
     fn exclusive_events_are_predicted_exactly() {
         let mut rng = Rng::new(2031);

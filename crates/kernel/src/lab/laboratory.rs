@@ -62,10 +62,10 @@ pub trait Laboratory: Sized {
         isa: Isa,
     ) -> Self;
 
-    /// Empty log for this tree. `seed` starts the shuffling, if the kind asks for it.
+    /// Empty log for this tree. `seed` starts the shuffling, if the kind shuffles.
     fn new_log(&self, kind: LogKind, seed: u64) -> Log;
 
-    /// Works out an order for a tree fresh from a collapse. [`Order::Simple`] leaves the tree as it is: in the
+    /// Computes an order for a tree fresh from a collapse. [`Order::Simple`] leaves the tree as it is: in the
     /// depth-first order of the binary tree, or in the order that the collapse learned.
     ///
     /// # Errors
@@ -74,7 +74,7 @@ pub trait Laboratory: Sized {
     fn plan(&self, order: Order, log: Option<&Log>, model: &CostModel) -> Result<SlotOrder, Error>;
 
     /// Mean cost of an occlusion query by the paper's equation (1), `C_any` of the root, with chances estimated from
-    /// `log`: for the slots as they stand, or as `order` would put them.
+    /// `log`: for the slots as they are, or as `order` would put them.
     ///
     /// # Errors
     /// [`Error::OtherTree`] when the log or the order is of a tree of another shape.
@@ -85,7 +85,7 @@ pub trait Laboratory: Sized {
         order: Option<&SlotOrder>,
     ) -> Result<f64, Error>;
 
-    /// Mean cost of an occlusion query in the tree as it stands, by a model of how events at children depend on each other.
+    /// Mean cost of an occlusion query in the tree as it is, by a model of how events at children depend on each other.
     /// The log has [masks](LogKind::masks).
     ///
     /// # Errors
@@ -109,8 +109,7 @@ pub trait Laboratory: Sized {
     /// Puts a tree fresh from its collapse into the order of a recipe, learned from `log` or else from `rays`. Where the
     /// order learns and there is neither, the tree stays as it is.
     ///
-    /// The [report](Bvh::report) tells how many rays were learned from, and the predicted cost before and
-    /// after.
+    /// The [report](Bvh::report) then has the number of rays learned from, and the predicted cost before and after.
     ///
     /// # Errors
     /// [`Error::NeedsBoxes`], [`Error::NeedsMasks`] or [`Error::OtherTree`] if the log given does not suit.
@@ -140,29 +139,28 @@ pub trait Laboratory: Sized {
         log: &mut Log,
     );
 
-    /// Nodes that rays visit, those of occluded rays apart from the others: [`Laboratory::occluded_batch_counted`]
-    /// summed up, on the threads of the current rayon pool.
+    /// Nodes that rays visit, counted separately for occluded rays and for the others:
+    /// [`Laboratory::occluded_batch_counted`] summed up, on the threads of the current rayon pool.
     fn visits(&self, rays: &[Ray]) -> Visits;
 
-    /// Nodes that rays would visit if each went straight to an occluder, by the shortest path to any: what the
-    /// best order of all, made for each ray alone, could save. The tree's own order does not matter.
+    /// Nodes that rays would visit if each went straight to an occluder, by the shortest path to any: what the best
+    /// order of all, made for each single ray, could save. The tree's own order does not matter.
     ///
     /// The difference to [`Laboratory::visits`] is the most that any order can still save.
     fn oracle_visits(&self, rays: &[Ray]) -> Visits;
 
-    /// Has batches prefetch or not, as the recipe wants or as a short timing of `rays` tells.
+    /// Has batches prefetch or not: as the recipe says, or else as a short timing of `rays` by its clock decides.
     fn choose_prefetch(&mut self, rays: &[Ray], recipe: &Recipe);
 
-    /// Has batches ask for nodes and leaves before their turn, or not, from now on.
+    /// Has batches prefetch nodes and leaves from now on, or not.
     fn set_prefetch(&mut self, prefetch: bool);
 
-    /// Tries on `rays`, as occlusion queries on the calling thread, whether batches are faster with or without asking for
-    /// nodes and leaves before their turn; keeps to what is faster and returns it. `clock` tells the time that has passed since
-    /// some moment: the kernel has no clock.
+    /// Times `rays`, as occlusion queries on the calling thread, with and without prefetching of nodes and leaves.
+    /// Keeps what is faster and returns it. `clock` returns the time that has passed since some moment: the kernel has
+    /// no clock.
     ///
-    /// A few thousand rays like those to come will do; rays met for the first time tell more than ones that were just
-    /// traced. With fewer than 512 there is nothing to be told, and a clock that stands still tells nothing either: then all
-    /// stays as it is.
+    /// A few thousand rays like the ones to come are enough. Rays traced for the first time say more than rays that
+    /// were just traced. With fewer than 512 rays, or a clock that does not advance, the setting stays as it is.
     fn time_prefetch(&mut self, rays: &[Ray], clock: impl Fn() -> Duration) -> bool;
 }
 
@@ -327,7 +325,7 @@ impl BinaryTree {
 
     /// Builds a tree for rays like these, all with the same weight, if the builder [needs rays](Builder::needs_rays);
     /// the others ignore them. Of more than 2¹⁴ rays an even selection is used. Without rays, and where hardly any
-    /// come, the tree is that of [`Builder::BinnedSah`].
+    /// come, the result is the tree of [`Builder::BinnedSah`].
     pub fn build_for(primitives: &Primitives, builder: Builder, rays: &[Ray]) -> Self {
         builder::build(primitives, builder, rays, &())
     }

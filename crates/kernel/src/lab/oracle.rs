@@ -41,7 +41,7 @@ impl Visits {
         )
     }
 
-    /// Adds those of other rays.
+    /// Adds the counts of other rays.
     pub fn merge(&mut self, other: &Self) {
         self.occluded_rays += other.occluded_rays;
         self.occluded_tests += other.occluded_tests;
@@ -74,7 +74,7 @@ pub(crate) fn add_shortest<const N: usize>(bvh: &WideTree<N>, log: &RayLog, sum:
     let mut shortest = Vec::new();
     for range in log.ranges() {
         let visits = &log.visits()[range];
-        // Children follow their parents, so going backwards meets them first.
+        // Children follow their parents, so going backwards visits them first.
         shortest.clear();
         shortest.resize(visits.len(), 0u64);
         for place in (0..visits.len()).rev() {

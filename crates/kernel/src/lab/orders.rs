@@ -42,7 +42,7 @@ pub(crate) fn plan<const N: usize>(
     }
 }
 
-/// The table of the orders by direction, in a tree whose slots stand by the order for all.
+/// The table of the orders by direction, in a tree whose slots are in the order for all.
 pub(crate) fn directed<const N: usize>(nodes: &[NodeOrders<N>], count: usize) -> ByRay {
     let mut table = DirectedOrder::with_capacity(count, nodes.len(), N);
     for orders in nodes {

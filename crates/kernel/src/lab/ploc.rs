@@ -1,5 +1,5 @@
-//! PLOC: a tree from below. Clusters, at first single primitives, stand in the order of a space-filling curve;
-//! in every round each looks for its best partner nearby, and those that choose each other become one.
+//! PLOC: a tree from below. Clusters, at first single primitives, are in the order of a space-filling curve; in every
+//! round each looks for its best partner nearby, and those that choose each other become one.
 //!
 //! Source: Meister and Bittner (2018), "Parallel Locally-Ordered Clustering for Bounding Volume Hierarchy
 //! Construction": the distance of two clusters is the area of the box around both. Deviations:

@@ -1,5 +1,5 @@
-//! A random order: what every other one has to beat. One permutation for each node, the same for all rays and the
-//! same whenever it is asked for.
+//! A random order: what every other one has to beat. One permutation for each node, the same for all rays and the same
+//! in every call.
 
 use alloc::vec::Vec;
 

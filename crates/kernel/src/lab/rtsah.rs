@@ -1,5 +1,5 @@
-//! The ray termination surface area heuristic: an order made of areas alone, in which a ray that enters one child
-//! may have been stopped by another one before.
+//! The ray termination surface area heuristic: an order made only of areas, in which a ray that enters one child may
+//! have been stopped by another one before.
 //!
 //! Source: Ize and Hansen (2011), "RTSAH Traversal Order for Occlusion Rays", for two children. Rays are uniform:
 //! `I_i`, the chance of entering child i, is the ratio of areas. With `V_i` the chance of passing child i without
@@ -47,7 +47,7 @@ pub(crate) fn plan<const N: usize>(bvh: &WideTree<N>, model: &CostModel) -> Slot
     let mut slots = vec![0; bvh.nodes.len() * N];
     // `C` and `V` of every node.
     let mut known = vec![(0.0, 1.0); bvh.nodes.len()];
-    // Children follow their parents, so going backwards meets them first.
+    // Children follow their parents, so going backwards visits them first.
     for (index, node) in bvh.nodes.iter().enumerate().rev() {
         let (mut costs, mut pass) = ([0.0; N], [0.0; N]);
         for slot in 0..node.len() {
@@ -255,7 +255,7 @@ mod tests {
         }
     }
 
-    /// Whether a line meets a box.
+    /// Whether a line hits a box.
     fn meets(org: [f64; 3], dir: [f64; 3], bounds: &Aabb) -> bool {
         let (mut enter, mut leave) = (f64::NEG_INFINITY, f64::INFINITY);
         for axis in 0..3 {
@@ -268,7 +268,7 @@ mod tests {
     }
 
     /// Uniform lines: through points spread evenly over a disc that covers the box, at right angles to it, in all
-    /// directions. Counts those that meet `all`, and of these those that meet the first, the second and both.
+    /// directions. Counts the lines that hit `all`, and of these the lines that hit the first, the second and both.
     fn count_lines(rng: &mut Rng, all: &Aabb, boxes: &[Aabb; 2], lines: usize) -> [f64; 4] {
         let center: [f64; 3] =
             core::array::from_fn(|axis| 0.5 * f64::from(all.min[axis] + all.max[axis]));
@@ -282,7 +282,7 @@ mod tests {
             let point = loop {
                 let point: [f64; 3] =
                     core::array::from_fn(|_| f64::from(rng.range(-1.2, 1.2)) * radius);
-                // Projected along the line, the points of a ball would crowd in the middle; those of a disc do not.
+                // Projected along the line, the points of a ball would crowd in the middle; points of a disc do not.
                 let along: f64 = (0..3).map(|axis| point[axis] * dir[axis]).sum();
                 let across: [f64; 3] = core::array::from_fn(|axis| point[axis] - along * dir[axis]);
                 let distance2: f64 = across.iter().map(|x| x * x).sum();

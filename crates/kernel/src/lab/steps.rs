@@ -1,7 +1,7 @@
 //! Single steps of a traversal, many at once, for benches: **not part of the stable interface**.
 //!
 //! A traversal consists of three kinds of steps: a ray is set up, a node is tested, a leaf is tested. [`Steps`]
-//! writes down which nodes and leaves some rays meet and then repeats the steps of one kind for all of them,
+//! writes down which nodes and leaves some rays visit and then repeats the steps of one kind for all of them,
 //! so that the cost of one step is the cost of the call divided by their number. They are the steps of a ray
 //! stream: the ray comes from memory, and leaves are tested without hurry.
 //!

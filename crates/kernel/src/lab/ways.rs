@@ -22,7 +22,7 @@ const FEW: usize = 8;
 /// Slots in the order of a visit, four bits each, the first one lowest.
 type Packed = u64;
 
-/// What rays meet, and how the children of each node lie along them.
+/// Visits and hits of rays, and how the children of each node lie along them.
 #[derive(Debug, Default)]
 pub(crate) struct Distances {
     pub log: RayLog,
@@ -91,7 +91,7 @@ impl<const N: usize> Observer for Measuring<'_, N> {
     }
 }
 
-/// The way of every node that costs the rays least, in a tree whose slots stand in their order.
+/// The [`Way`] of every node that costs the rays least, in a tree whose slots are in their order.
 pub(crate) fn learn_ways<const N: usize>(
     bvh: &WideTree<N>,
     distances: &Distances,
@@ -106,7 +106,7 @@ pub(crate) fn learn_ways<const N: usize>(
 
 fn sort_all<const N: usize>(learner: &mut Learner<'_, N>, distances: &Distances) -> Vec<Way> {
     let mut ways = vec![Way::Slots; learner.bvh.nodes.len()];
-    // Children follow their parents, so going backwards meets them first.
+    // Children follow their parents, so going backwards visits them first.
     for (node, way) in ways.iter_mut().enumerate().rev() {
         learner.gather(node);
         let mut sums = [0.0; Way::ALL.len()];
@@ -169,7 +169,7 @@ fn cost<const N: usize>(
 
 /// Finds out how far the rays come by these ways.
 fn trace<const N: usize>(learner: &mut Learner<'_, N>, distances: &Distances, ways: &[Way]) {
-    // A visit stands before those below it.
+    // A visit comes before the visits below it.
     for (place, visit) in learner.visits.iter().enumerate() {
         let mut entered = 0;
         if learner.arrives[place] {

@@ -112,7 +112,7 @@ impl Witness for Evidence {
 }
 
 impl Evidence {
-    /// Adds what other rays meet.
+    /// Adds the rays of `other` and what they hit.
     fn append(&mut self, other: Self) {
         let before = self.rays.len() as u32;
         self.rays.extend(other.rays);

@@ -1,9 +1,9 @@
 //! Object splits judged by what sample rays do: what the ray-driven builders have in common. They differ in what
 //! they take a split to cost.
 //!
-//! Every node knows the rays that enter its box and which primitives in it they hit; every candidate for a split
-//! is judged by exact counts of both on its two sides. Where fewer than [`MIN_RAYS`] rays come there is nothing
-//! to be learned, and binned SAH goes on; without rays the tree is that of binned SAH.
+//! Every node knows the rays that enter its box and which primitives in it they hit; every candidate for a split is
+//! judged by exact counts of both on its two sides. Where fewer than [`MIN_RAYS`] rays come there is nothing to be
+//! learned, and binned SAH goes on; without rays the tree is the tree of binned SAH.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -42,13 +42,13 @@ pub(crate) struct Measure {
     pub entered: usize,
     /// Rays that hit a primitive.
     pub hits: usize,
-    /// Sum over these of `1 / (1 + k)`, `k` being how many they hit: the share of all there is that a ray meets
+    /// Sum over these of `1 / (1 + k)`, `k` being how many they hit: the share of all primitives that a ray tests
     /// before the first of `k` at random places stops it.
     pub until_hit: f64,
 }
 
 impl Measure {
-    /// Area relative to that of the parent; 1 where that cannot be told.
+    /// Area relative to the parent's; 1 where the quotient is not finite.
     pub fn area_share(&self, parent: &Self) -> f64 {
         let share = self.area / parent.area;
         if share.is_finite() { share } else { 1.0 }
@@ -202,7 +202,7 @@ impl<C: SplitCost> Plan<'_, C> {
             prims: node.prims.len(),
             entered: node.rays.len(),
             hits: places.chunk_by(|a, b| a.0 == b.0).count(),
-            // Nothing asks for it.
+            // Nothing reads it.
             until_hit: 0.0,
         };
         let mut best: Option<Split> = None;

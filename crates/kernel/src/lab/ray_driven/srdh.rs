@@ -9,15 +9,15 @@
 //!
 //! with the costs `C_b` of a box test and `C_k` of a node, the chance `I` of entering its box and the chance
 //! `H_l` of being stopped in the left child, counted from representative rays. Of both orders the cheaper one
-//! counts, and becomes that of the children. Choices made here:
+//! counts, and becomes the order of the children. Choices made here:
 //! - The boxes of all children are tested at one go, so `C_b` and `C_k` are the same for every split and left
 //!   out, because the chance of entering a child is part of its cost. Equation (1) of Ogaki and
 //!   Derouet-Jourdan (2016) for two children is left.
-//! - The contents of a child cost, before it is built, what [`crate::builder::cost`] says, times the share that a ray meets
-//!   before it is stopped there: all, for a ray that is not, and `1 / (1 + k)` for one that hits `k` primitives.
+//! - The contents of a child cost, before it is built, what [`crate::builder::cost`] says, times the share that a ray
+//!   tests before it is stopped there: all, for a ray that is not, and `1 / (1 + k)` for one that hits `k` primitives.
 //!   Without that factor large children that stop everything look dear, and small ones are split off one by one.
 //! - Chances are blended with areas as in [`crate::lab::ray_driven::rdh`]; the imaginary rays hit nothing.
-//! - Their tree is a second one for shadow rays alone. Ours serves any query, since answers are the same.
+//! - Their tree is a second one, only for shadow rays. Ours serves any query, since answers are the same.
 
 use crate::builder::cost::Cost;
 use crate::lab::ray_driven::rdh::{blended, chance};

@@ -237,8 +237,8 @@ fn uniform_rays_enter_boxes_by_area() {
     }
 }
 
-/// The cost of SRDH is equation (1) of Ogaki and Derouet-Jourdan for two children, in the better order, which is
-/// that of appendix A.
+/// The cost of SRDH is equation (1) of Ogaki and Derouet-Jourdan for two children, in the better order, which is the
+/// order of appendix A.
 #[test]
 fn srdh_is_the_model_for_two_children() {
     use crate::order::ratio::{ChildCost, cost_any};

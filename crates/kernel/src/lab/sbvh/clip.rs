@@ -3,11 +3,11 @@
 //! # Why no part of a triangle is lost
 //!
 //! [`crate::geometry::ray_setup`] shows that a triangle that is hit has a point `P` within `11 u R` of where the ray is
-//! at the distance of the hit, and that every widened box with `P` in it is entered at that distance or before, and left
-//! there or later. A split triangle stands in several leaves, and the boxes of these hold it all: what lies between two
-//! planes is found in double precision, rounded outwards, and put into a box that is never larger than what the leaf had
-//! before the split. So one of the leaves has a box with `P` in it, and that leaf is visited as the leaf of a whole triangle
-//! would be. A test is of the whole triangle, wherever it is made, and gives the same answer.
+//! at the distance of the hit, and that every widened box with `P` in it is entered at that distance or before, and
+//! left there or later. A split triangle is in several leaves, and the boxes of these hold it all: what lies between
+//! two planes is found in double precision, rounded outwards, and put into a box that is never larger than what the
+//! leaf had before the split. So one of the leaves has a box with `P` in it, and that leaf is visited as the leaf of a
+//! whole triangle would be. A test is of the whole triangle, wherever it is made, and gives the same answer.
 
 use crate::aabb::Aabb;
 
