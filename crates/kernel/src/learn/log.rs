@@ -1,8 +1,8 @@
-//! The training log of a wide tree: counters of what occlusion rays met, one copy per worker, added up afterwards.
+//! The training log of a wide tree: counters of what occlusion rays hit, one copy per worker, added up afterwards.
 //!
-//! Hits of a *leaf* (paper, Listing 1) are counted where a ray ends; those of inner
-//! children are their sums, since every occluded ray ends in exactly one leaf. A ray that ends below an
-//! instance is counted there, too: the counters of its object are those of all instances together.
+//! Hits of a *leaf* (paper, Listing 1) are counted where a ray ends. Hits of inner children are their sums, since every
+//! occluded ray ends in exactly one leaf. A ray that ends below an instance is counted there, too: the counters of its
+//! object are sums over all instances.
 //!
 //! A partly transparent triangle ends the share of rays that its opacity says, always the same ones, so its
 //! counters grow by its opacity, stochastically but reproducibly, as section 4.2 wants it.
@@ -31,9 +31,9 @@ pub struct LogKind {
 }
 
 impl LogKind {
-    /// Whether a log of this kind holds all that one of the `other` kind would hold of the same rays, so that
-    /// whatever learns from that one can learn the same from this one. Visiting children in another order meets
-    /// other primitives: neither of a shuffled and a straight log covers the other.
+    /// Whether a log of this kind holds all that one of the `other` kind would hold of the same rays, so that whatever
+    /// learns from that one can learn the same from this one. Rays that visit children in another order hit other
+    /// primitives: neither of a shuffled and a straight log covers the other.
     #[cfg(feature = "lab")]
     pub const fn covers(self, other: Self) -> bool {
         self.shuffled == other.shuffled

@@ -1,8 +1,8 @@
-//! Learning: from rays to what orders and collapses are worked out from.
+//! Learning: from rays to what orders and collapses are computed from.
 //!
 //! - `surface_rays`: training rays when nobody gives any;  `placed_surfaces`: of instances
-//! - `tree_log`: what training rays meet in the binary tree;  `node_lists`: how it is packed
-//! - `log`: what they meet in a wide tree;  `ray_log`: what each of them meets there
+//! - `tree_log`: what training rays hit in the binary tree;  `node_lists`: how it is packed
+//! - `log`: what they hit in a wide tree;  `ray_log`: what each of them hits there
 
 pub(crate) mod log;
 mod node_lists;

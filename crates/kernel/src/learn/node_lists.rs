@@ -76,7 +76,7 @@ impl NodeLists {
             rest = others;
             let mut next = 0;
             let mut entries = 0;
-            // As many places as there are numbers are enough, and what is written in place need not ask for room.
+            // As many places as there are numbers are enough, and what is written in place need not check for room.
             for place in &mut list[..len as usize] {
                 let [number, more @ ..] = numbers else { break };
                 numbers = more;

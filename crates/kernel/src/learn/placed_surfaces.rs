@@ -13,16 +13,16 @@ use crate::parallel;
 /// Primitives that are summed up at one go.
 const CHUNK: usize = 4096;
 
-/// The surfaces of instances one after the other, behind those of the world itself.
+/// The surfaces of instances one after the other, behind the surfaces of the world itself.
 pub(crate) struct PlacedSurfaces<'a> {
     primitives: &'a Primitives,
     /// Surfaces of every object.
     objects: Vec<Surfaces<'a>>,
     /// Factor by which each instance enlarges areas.
     enlargements: Vec<f64>,
-    /// All surfaces, those of the world included.
+    /// All surfaces, including the surfaces of the world.
     pub all: Weights,
-    /// Share of all surfaces that stands before each instance, as far as there are surfaces.
+    /// Share of all surfaces that comes before each instance, as far as there are surfaces.
     before: Vec<f64>,
 }
 

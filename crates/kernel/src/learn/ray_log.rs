@@ -1,8 +1,8 @@
-//! Everything that each ray of a log meets in a wide tree when it does not stop at the first occluder: at every node that
-//! it comes to, which boxes it hits and below which of them something occludes it.
+//! Everything that each ray of a log hits in a wide tree when it does not stop at the first occluder: at every node
+//! that it comes to, which boxes it hits and below which of them something occludes it.
 //!
 //! So the cost of the ray is known for any order of children, without an assumption on how the hits of different
-//! children depend on each other. Slots are those of the tree as it was logged.
+//! children depend on each other. Slots are the slots of the tree as it was logged.
 
 use alloc::vec::Vec;
 
@@ -10,8 +10,8 @@ use crate::hash;
 use crate::ray::Ray;
 use crate::trace::observe::{NodeVisit, Observer, Place};
 
-/// A ray at a node. The visits of a ray stand in the depth-first order of slots: behind a visit stand those of the
-/// first child that the ray goes on to, and all below it, then those of the next.
+/// A ray at a node. The visits of a ray are in the depth-first order of slots. A visit is followed by the visit of the
+/// first child that the ray goes on to and all visits below it, then by the next child's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Visit {
     /// The node.
@@ -98,8 +98,8 @@ impl Eq for RayLog {}
 
 /// Follows rays to their ends and writes a [`RayLog`]: slots must be visited in ascending order.
 ///
-/// A visit is complete when all visits below it are known. Those stand behind it, so one pass from the last visit of a
-/// ray to the first completes them all.
+/// A visit is complete when all visits below it are known. Visits below it follow it, so one pass from the last visit
+/// of a ray to the first completes them all.
 pub(crate) struct Following<'a> {
     log: &'a mut RayLog,
     /// A hash of the ray.
@@ -135,7 +135,7 @@ impl Observer for Following<'_> {
     fn node(&mut self, visit: &NodeVisit<'_>) -> u32 {
         let number = self.from.len() as u32;
         self.from.push(visit.from);
-        // Slots stand in descending lanes.
+        // Slots are in descending lanes.
         let hit = visit.lanes.reverse_bits() >> (u32::BITS - visit.width as u32);
         self.log.visits.push(Visit {
             node: visit.node as u32,

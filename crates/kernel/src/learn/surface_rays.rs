@@ -1,4 +1,4 @@
-//! Surface rays: synthetic training rays that resemble those of a renderer, made from the surfaces alone.
+//! Surface rays: synthetic training rays that resemble the rays of a renderer, made only from the surfaces.
 
 use alloc::vec::Vec;
 
@@ -30,7 +30,7 @@ const RAYS_PER_TASK: usize = 64;
 /// area, so that a ground plane or a sky of two triangles does not get them all. Every instance has the
 /// surface of its object, as large as it is in the world.
 ///
-/// The result depends on the primitives, the count and the seed alone. The list is empty if no primitive has an area.
+/// The result depends only on the primitives, the count and the seed. The list is empty if no primitive has an area.
 /// Uses the rayon pool that is current, if the `parallel` feature is on.
 pub fn surface_rays(primitives: &Primitives, count: usize, seed: u64) -> Vec<Ray> {
     surface_rays_within(primitives, &primitives.bounds(), count, seed)

@@ -1,10 +1,10 @@
-//! What sample rays meet in a *binary* tree, without stopping at the first occluder.
+//! The training log of a *binary* tree: which nodes sample rays enter and which primitives they hit, without stopping at
+//! the first occluder.
 //!
-//! Every N-wide tree over the same primitives is a collapse of the binary one, so this one log serves
-//! them all, whatever their width and the order of their children: it is not biased by any order, and
-//! needs no shuffling. It keeps what each ray met, not only sums, so that the visits of rays that do stop
-//! can be counted for any order, see [`TreeLog::visits`]. Objects have logs of their own, in which the rays of
-//! all instances come together.
+//! Every N-wide tree over the same primitives is a collapse of the binary one, so this one log serves them all,
+//! whatever their width and the order of their children: it is not biased by any order, and needs no shuffling. It
+//! keeps what each ray hit, not only sums, so that the visits of rays that do stop can be counted for any order, see
+//! [`TreeLog::visits`]. Objects have logs of their own, in which the rays of all instances come together.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -31,12 +31,12 @@ const RAY_BYTES: usize = 8;
 const NODE_BYTES: usize = 2;
 /// Bytes of a hit of a primitive.
 const HIT_BYTES: usize = size_of::<u32>();
-/// Bytes of a log whatever the scene: all, and those of one call of [`TreeLog::add`].
+/// Bytes of a log whatever the scene: of the whole log, and of one call of [`TreeLog::add`].
 const FREE_BYTES: [usize; 2] = [48 << 20, 32 << 20];
 /// Further bytes per node, primitive and instance of all trees.
 const BYTES_PER_ITEM: [usize; 2] = [16, 12];
 
-/// What sample rays met in a binary tree.
+/// Training log of a binary tree: the nodes that sample rays entered and the primitives that they hit.
 ///
 /// A few thousand rays are plenty; each takes a hundred bytes or so until the log is dropped, in a forest of instances seven hundred.
 /// Rays through thousands of coincident primitives would take a thousand times as much. Fewer of them are kept then: see
@@ -56,11 +56,11 @@ pub struct TreeLog {
     weights: Vec<f32>,
     /// Nodes that they entered, see [`Met::nodes`].
     met: NodeLists,
-    /// What they met in objects: every ray counts once for each instance of the object that it enters.
+    /// Logs of objects: every ray counts once for each instance of the object that it enters.
     pub(crate) objects: Vec<TreeLog>,
 }
 
-/// What some rays meet in one binary tree.
+/// Nodes that some rays entered in one binary tree, and primitives that they hit.
 struct Met<'a> {
     /// Bytes that may still be written, shared by the trees that the rays go through.
     left: &'a Cell<usize>,
@@ -160,9 +160,9 @@ impl TreeLog {
         }
     }
 
-    /// What `count` [`surface_rays`](crate::lab::surface_rays) meet, each of weight 1: the default log of a scene whose rays are not
-    /// known yet. `None` is the number that suits its size: their cost stays in proportion to that of the
-    /// build, and on five scenes 1000 rays give nearly the visits that 4000 do, 256 up to 25 % more.
+    /// What `count` [`surface_rays`](crate::lab::surface_rays) hit, each of weight 1: the default log of a scene whose
+    /// rays are not known yet. `None` is the number that suits its size: their cost stays in proportion to the cost of
+    /// the build, and on five scenes 1000 rays give nearly the visits that 4000 do, 256 up to 25 % more.
     pub fn of_surfaces(primitives: &Primitives, tree: &BinaryTree, count: Option<usize>) -> Self {
         /// Any seed does; results must not depend on when or where they are computed.
         const SEED: u64 = 2016;
@@ -243,7 +243,7 @@ impl TreeLog {
         }
     }
 
-    /// Adds the nodes and primitives that some rays, each of this weight, met in this tree.
+    /// Adds the nodes that some rays, each of this weight, entered in this tree, and the primitives that they hit.
     fn append(&mut self, (nodes, prims): (NodeLists, Vec<u32>), weight: f32) {
         self.weights
             .extend(core::iter::repeat_n(weight, nodes.len()));
@@ -309,7 +309,7 @@ impl TreeLog {
                 let mut hits = vec![0.0; self.nodes];
                 self.for_each_ray(|weight, nodes| {
                     // Depth-first order: what is below a node follows it. The nearest hit leaf at or after it
-                    // tells whether any is below.
+                    // says whether any is below.
                     let mut nearest = u32::MAX;
                     for &entry in nodes.iter().rev() {
                         let node = entry & !Met::HIT;

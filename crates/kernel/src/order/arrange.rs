@@ -2,8 +2,8 @@
 //! not on their order among themselves.
 //!
 //! Few things are arranged exactly, by dynamic programming over subsets (Held and Karp 1962). More of them are first
-//! put in order greedily, which is then improved by taking one at a time out and putting it in elsewhere, as long as
-//! that helps; the order in which they were given is improved, too, and the better of the two is taken.
+//! sorted greedily. That order is then improved by taking one at a time out and putting it in elsewhere, as long as
+//! that helps. The order in which they were given is improved, too, and the better of the two is taken.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -13,15 +13,15 @@ pub(crate) const EXACT: usize = 8;
 
 /// Costs of things. Things are numbered from 0; a set has a bit for each.
 pub(crate) trait Costs {
-    /// The cost of a thing when those of the set come before it.
+    /// The cost of a thing when the things of the set come before it.
     fn cost(&self, thing: usize, before: u32) -> f64;
 
     /// Use of a thing to all that follow, in any unit: greedily, the one of most use for its cost is next.
     fn gain(&self, thing: usize, before: u32) -> f64;
 }
 
-/// The cheapest order of `len` things that is found. Where it does not matter, they stand by their numbers; they are
-/// best numbered by some good order already.
+/// The cheapest order of `len` things that is found. Where it does not matter, they are sorted by their numbers; they
+/// are best numbered by some good order already.
 pub(crate) fn arrange(len: usize, costs: &impl Costs) -> Vec<usize> {
     if len <= EXACT {
         return exact(len, costs);

@@ -1,13 +1,13 @@
 //! Child orders: in which sequence an occlusion query visits the children of a node.
 //!
-//! An order is a permutation of slots, worked out once ([`SlotOrder`]) and applied once. The cost of a query depends on
+//! An order is a permutation of slots, computed once ([`SlotOrder`]) and applied once. The cost of a query depends on
 //! the order, its answer never does. Closest-hit queries go front to back and do not notice.
 //!
 //! - without rays: `area`: larger boxes first;  `size`: fewer primitives first
 //! - learned from a training log: `ratio`: the paper's rule and its cost model;  `joint`: least measured cost
 //! - `arrange`: the cheapest order of a few things
 //!
-//! Rows that the table has with the feature `lab` alone are planned in [`crate::lab`].
+//! Rows that the table has only with the feature `lab` are planned in [`crate::lab`].
 
 pub(crate) mod area;
 pub(crate) mod arrange;
@@ -136,7 +136,7 @@ impl Order {
     }
 }
 
-/// Works out an order for a tree whose slots stand as its builder left them.
+/// Computes an order for a tree whose slots are as its builder left them.
 pub(crate) fn plan<const N: usize>(
     bvh: &WideTree<N>,
     order: Order,

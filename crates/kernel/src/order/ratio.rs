@@ -8,17 +8,17 @@
 //! C_any = C_mb + Σ_i I_i C_i Π_{j<i} (1 - H_j)        (1)
 //! ```
 //!
-//! `I_i` being the chance of hitting the box of child i, `H_i` that of hitting a primitive below it, and
-//! `C_p N_p` the cost of a leaf. The cost is least when children stand by falling `H_i / (I_i C_i)` (appendix
-//! A). Costs of children depend on their own order, so nodes are sorted bottom-up. Below an instance is the
-//! tree of its object, sorted by the rays of all its instances together; the cost of the instance is what it
-//! takes to enter it and the cost of that tree.
+//! `I_i` being the chance of hitting the box of child i, `H_i` the chance of hitting a primitive below it, and
+//! `C_p N_p` the cost of a leaf. The cost is least when children are sorted by falling `H_i / (I_i C_i)` (appendix A).
+//! Costs of children depend on their own order, so nodes are sorted bottom-up. Below an instance is the tree of its
+//! object, sorted by the rays of all its instances together; the cost of the instance is what it takes to enter it and
+//! the cost of that tree.
 //!
-//! A log that visits children in one order alone is biased by it: a frequent occluder that is always reached after
-//! another one is hardly ever counted. Shuffling while logging is the paper's remedy. Another one, not in the
-//! paper, needs none: of the `V_i` rays that really came to child i, the share that it occluded stands for all
-//! that hit its box, `H_i = N_i / N · L_i / V_i`. (Rays that hit child i and came to it are those that children
-//! before it did not occlude; that these are occluded by it as often as the others is the model's own assumption.)
+//! A log that visits children in only one order is biased by it: a frequent occluder that is always reached after
+//! another one is hardly ever counted. Shuffling while logging is the paper's remedy. Another one, not in the paper,
+//! needs none: of the `V_i` rays that really came to child i, the share that it occluded stands for all that hit its
+//! box, `H_i = N_i / N · L_i / V_i`. (Rays that hit child i and came to it are the rays that children before it did not
+//! occlude; that these are occluded by it as often as the others is the model's own assumption.)
 //!
 //! Deviations, all for scarce evidence:
 //! - `N`, the rays that intersect the node, counts those that tested it: a ray that ended before it came
@@ -137,7 +137,7 @@ pub(crate) fn plan<const N: usize>(
 }
 
 /// `C_any` of the root with the slots as `order` would put them. An order that picks at run time is
-/// costed as the slots stand: the model does not know distances.
+/// costed as the slots are: the model does not know distances.
 pub(crate) fn predicted_cost<const N: usize>(
     bvh: &WideTree<N>,
     log: &Log,
@@ -169,8 +169,7 @@ pub(crate) fn sorted_lanes(hits: &[u32; BLOCK]) -> [u8; BLOCK] {
     lanes
 }
 
-/// Goes through the nodes bottom-up, asks `order` for the visiting order of each, and returns the cost
-/// of the root.
+/// Goes through the nodes bottom-up, gets the visiting order of each from `order`, and returns the cost of the root.
 fn walk<const N: usize>(
     bvh: &WideTree<N>,
     log: &Log,
@@ -180,7 +179,7 @@ fn walk<const N: usize>(
 ) -> f64 {
     let mut costs = vec![0.0; bvh.nodes.len()];
     let mut hits = vec![0u64; bvh.nodes.len()];
-    // Children follow their parents, so going backwards meets them first.
+    // Children follow their parents, so going backwards visits them first.
     for (index, node) in bvh.nodes.iter().enumerate().rev() {
         let mut child_hits = [0u64; N];
         let mut child_visits = [0u32; N];
@@ -266,7 +265,7 @@ fn chances<const N: usize>(
     }
 }
 
-/// Areas of children relative to that of their parent.
+/// Areas of children relative to their parent's.
 pub(crate) fn area_shares<const N: usize>(areas: &[f32; N], parent: f32) -> [f64; N] {
     areas.map(|area| {
         let share = f64::from(area) / f64::from(parent);

@@ -13,7 +13,7 @@ use crate::tree::wide::WideTree;
 pub(crate) fn plan<const N: usize>(bvh: &WideTree<N>) -> SlotOrder {
     let mut counts = vec![0usize; bvh.nodes.len()];
     let mut slots = vec![0; bvh.nodes.len() * N];
-    // Children follow their parents, so going backwards meets them first.
+    // Children follow their parents, so going backwards visits them first.
     for (index, node) in bvh.nodes.iter().enumerate().rev() {
         let mut key = [0.0; N];
         for (slot, key) in key.iter_mut().enumerate().take(node.len()) {

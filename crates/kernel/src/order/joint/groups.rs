@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 use super::passage::Passage;
 use crate::order::arrange::{Costs, EXACT, arrange};
 
-/// The order in which children that occlude any ray come first, as is cheapest, and the others follow as they stand in
+/// The order in which children that occlude any ray come first, as is cheapest, and the others follow in the order of
 /// `ratio`.
 pub(crate) fn least_cost<const N: usize>(
     passages: &[Passage<N>],
@@ -48,7 +48,7 @@ struct Group<const N: usize> {
 }
 
 impl<const N: usize> Groups<N> {
-    /// Groups for the order of these children alone.
+    /// Groups for the order of only these children.
     fn new(passages: &[Passage<N>], children: &[u8], weight: &dyn Fn(&Passage<N>) -> f64) -> Self {
         // Rays that nothing occludes cost the same in any order; so do those that hit but one box.
         let mut stopped: Vec<_> = passages
@@ -83,7 +83,7 @@ impl<const N: usize> Groups<N> {
         }
     }
 
-    /// Costs worked out beforehand for all sets of at most [`EXACT`] children.
+    /// Costs computed beforehand for all sets of at most [`EXACT`] children.
     fn table(&self) -> Table {
         let sets = 1usize << self.len;
         let mut costs = vec![[0.0; EXACT]; sets];
@@ -141,7 +141,7 @@ impl Costs for Table {
         self.costs[self.costs.len() - 1 - before as usize][child]
     }
 
-    /// Not asked for: so few children are arranged exactly.
+    /// Not called: so few children are arranged exactly.
     fn gain(&self, _: usize, _: u32) -> f64 {
         0.0
     }

@@ -23,8 +23,8 @@ pub(crate) struct Learner<'a, const N: usize> {
     pub bvh: &'a WideTree<N>,
     pub model: &'a CostModel,
     pub visits: &'a [Visit],
-    /// Visits by node, and where those of each begin. In an order that depends on nothing but the rays, so that
-    /// sums come out the same.
+    /// Visits by node, and where the visits of each node begin. In an order that depends on nothing but the rays, so
+    /// that sums come out the same.
     places: Vec<u32>,
     firsts: Vec<usize>,
     /// Cost of each visit, once its node is sorted.
@@ -78,7 +78,7 @@ impl<'a, const N: usize> Learner<'a, N> {
     /// Finds the orders of all nodes for the rays that arrive.
     pub fn sort_all(&mut self, directions: Directions) -> Vec<NodeOrders<N>> {
         let mut by_node = vec![NodeOrders::one([0; N]); self.bvh.nodes.len()];
-        // Children follow their parents, so going backwards meets them first.
+        // Children follow their parents, so going backwards visits them first.
         for (node, orders) in by_node.iter_mut().enumerate().rev() {
             *orders = self.sort(node, directions);
         }
@@ -87,7 +87,7 @@ impl<'a, const N: usize> Learner<'a, N> {
 
     /// Finds out how far the rays come in these orders.
     fn trace(&mut self, by_node: &[NodeOrders<N>]) {
-        // A visit stands before those below it.
+        // A visit comes before the visits below it.
         for (place, visit) in self.visits.iter().enumerate() {
             let mut entered = 0;
             if self.arrives[place] {
@@ -156,7 +156,7 @@ impl<'a, const N: usize> Learner<'a, N> {
         }
     }
 
-    /// Cost of entering each child for every ray that hits its box, without what is met in the nodes below.
+    /// Cost of entering each child for every ray that hits its box, without the costs of the nodes below.
     fn fixed_costs(&self, node: &Node<N>) -> [f64; N] {
         let mut fixed = [0.0; N];
         for (slot, cost) in fixed.iter_mut().enumerate().take(node.len()) {

@@ -2,19 +2,19 @@
 //! assumption of the paper's model that hits of different children are independent.
 //!
 //! The log says of every ray and every node that it comes to which boxes it hits and below which of them something
-//! occludes it, whether or not an occlusion query would have come there ([`RayLog`]). Given an order, the ray's
-//! cost in the node is that of the children hit, up to the first that occludes it, and each child's cost for this
-//! very ray follows from the child's own order: nodes are worked out bottom-up. The cheapest order of the
-//! children is found by [`arrange()`]: exactly for up to eight children that occlude anything, nearly so for more.
+//! occludes it, whether or not an occlusion query would have come there ([`RayLog`]). Given an order, the ray's cost in
+//! the node is the cost of the children hit, up to the first that occludes it, and each child's cost for this very ray
+//! follows from the child's own order: nodes are computed bottom-up. The cheapest order of the children is found by
+//! [`arrange()`]: exactly for up to eight children that occlude anything, nearly so for more.
 //!
-//! A child that never occludes is best visited after all that do; which of those comes first does not matter to
-//! the log. They, and children in doubt, stand by the paper's rule `H / (I C)`, with its chances taken from the
-//! same log and blended with a prior as in [`crate::order::ratio`]. Nodes that no ray came to keep area order.
+//! A child that never occludes is best visited after all that do; which of those comes first does not matter to the
+//! log. They, and children in doubt, are sorted by the paper's rule `H / (I C)`, with its chances taken from the same
+//! log and blended with a prior as in [`crate::order::ratio`]. Nodes that no ray came to keep area order.
 //!
 //! Which rays come to a node depends on the orders of the nodes above it, which are not known yet. So the nodes are
-//! sorted twice (`ROUNDS`): at first for all rays that hit their boxes, then for those that come to them in the tree
-//! so sorted. Rays that something else occludes before count little then, but not nothing (`STOPPED`), so that few rays
-//! do not decide alone.
+//! sorted twice (`ROUNDS`): at first for all rays that hit their boxes, then for those that come to them in the tree so
+//! sorted. Rays that something else occludes before count little then, but not nothing (`STOPPED`), so that few rays do
+//! not decide by themselves.
 //!
 //! With [`Directions`] a node has several orders, each learned from the rays that will use it. The other rays
 //! count a little, for the same reason.

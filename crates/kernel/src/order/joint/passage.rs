@@ -4,7 +4,7 @@ use crate::order::ratio::{area_shares, precise_chances};
 use crate::order::sorted_by_key;
 use crate::tree::node::Node;
 
-/// A ray in the node at hand.
+/// A ray in the node that is being sorted.
 pub(crate) struct Passage<const N: usize> {
     /// Its visit, as the log counts them.
     pub visit: usize,

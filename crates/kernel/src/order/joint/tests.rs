@@ -217,7 +217,7 @@ fn no_order_of_a_small_node_is_cheaper() {
     }
 }
 
-/// Where independence fails: two children occlude the same rays, a third one the others. Alone, each of the two
+/// Where independence fails: two children occlude the same rays, a third one the others. By itself, each of the two
 /// stops more rays than the third; once one of them has been visited, the other one stops none.
 #[test]
 fn what_is_stopped_already_is_not_counted_again() {
