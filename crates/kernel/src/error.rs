@@ -151,7 +151,7 @@ pub enum Error {
     },
     /// A build was stopped by its [monitor](crate::BuildMonitor).
     Cancelled,
-    /// A refit was asked for with another number of sound primitives than the tree was built over.
+    /// A refit got another number of sound primitives than the tree was built over.
     OtherPrimitives {
         /// How many the tree was built over.
         expected: usize,
@@ -174,11 +174,11 @@ pub enum Error {
         /// Children per node of the object.
         found: usize,
     },
-    /// A learned order was asked for without the log it learns from.
+    /// A learned order was requested without the log it learns from.
     NeedsLog(&'static str),
     /// A log holds too little for the order: it was made without box hits.
     NeedsBoxes(&'static str),
-    /// A log holds too little for the order: it does not say what each ray met.
+    /// A log holds too little for the order: it does not say what each ray hit.
     NeedsMasks(&'static str),
     /// A log or order was made for a tree of another shape.
     OtherTree {

@@ -1,6 +1,6 @@
 //! A ray tracing kernel built around the occlusion query: *is anything between these two points?*
 //!
-//! Build a tree over your geometry, ask it, and let it learn from your own rays:
+//! Build a tree over your geometry, query it, and let it learn from your own rays:
 //!
 //! ```
 //! use antumbra::{Bvh, Geometry, Ray, Recipe};
@@ -27,8 +27,9 @@
 //!
 //! # What holds of every answer
 //! - The same bits for every recipe, instruction set, batch size and number of threads.
-//! - Closed meshes do not leak: the triangle test is watertight along edges and around corners, and tells the distance of
-//!   thin triangles as well as of others. A ray that begins at least 2⁻²⁰ of the scene extent inside a closed mesh hits it.
+//! - Closed meshes do not leak: the triangle test is watertight along edges and around corners, and finds the distance
+//!   of thin triangles as well as of others. A ray that begins at least 2⁻²⁰ of the scene extent inside a closed mesh
+//!   hits it.
 //! - The interval of a ray is open, `tnear < t < tfar`; [`Ray::closed`] closes it. Rays with NaN, of zero length or
 //!   infinite hit nothing.
 //! - Tracing cannot fail; building returns errors.
@@ -66,15 +67,16 @@
 //! A [`MovingBvh`] has motion blur: meshes and instances that move while rays are traced, each ray at a time of its own.
 //!
 //! # Where things are
-//! [`Geometry`] and [`Primitives`] go in, a [`Recipe`] says how, [`Bvh`] answers. [`Bvh::batch`] takes many rays, also from
-//! separate arrays ([`RayColumns`]), and [`Bvh::write`] saves a tree. [`cutout`] has partly transparent triangles,
-//! [`UserGeometry`] primitives of your own. [`Bvh::query`] asks with [`Masks`] and filters. [`Brute`] gives the same answers without any tree. [`Build`] has every choice of a build, [`Stage`] makes many trees from one.
+//! [`Geometry`] and [`Primitives`] go in, a [`Recipe`] says how, [`Bvh`] answers. [`Bvh::batch`] takes many rays, also
+//! from separate arrays ([`RayColumns`]), and [`Bvh::write`] saves a tree. [`cutout`] has partly transparent triangles,
+//! [`UserGeometry`] primitives of your own. [`Bvh::query`] adds [`Masks`] and filters to a query. [`Brute`] gives the
+//! same answers without any tree. [`Build`] has every choice of a build, [`Stage`] makes many trees from one.
 //!
 //! # Features
 //! - `parallel` (default): builds and batches use the threads of rayon's pool.
-//! - `std` (default): asks the CPU what it has, keeps memory of queries between calls, reads and writes files. Without it the
-//!   kernel needs `alloc` alone, takes the instruction set that it is compiled for, and a batch takes memory
-//!   from the allocator.
+//! - `std` (default): detects what the CPU has, keeps memory of queries between calls, reads and writes files. Without
+//!   it the kernel needs only `alloc`, takes the instruction set that it is compiled for, and a batch takes memory from
+//!   the allocator.
 //! - `bytemuck`: `Pod` for [`Ray`] and [`Hit`].
 //! - `lab`: builders, collapses and child orders for comparisons, training logs, and queries that count. Off by default.
 //!
@@ -170,7 +172,7 @@ pub mod recipe {
 
 /// Partly transparent triangles: leaves cut out of rectangles, nets, veils.
 ///
-/// A mesh made by [`Geometry::cutouts`] has an [`Opacity`](cutout::Opacity), which is asked where a ray hits it.
+/// A mesh made by [`Geometry::cutouts`] has an [`Opacity`](cutout::Opacity), which is called where a ray hits it.
 pub mod cutout {
     pub use crate::geometry::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 }

@@ -3,7 +3,7 @@
 use crate::Width;
 use crate::recipe::{Builder, Collapse, Level, Order, Preset};
 
-/// Names are unique and lead back to their rows; sentences stand alone.
+/// Names are unique and lead back to their rows. Sentences have more than ten bytes and no full stop.
 macro_rules! check {
     ($($list:ident),*) => {
         $(

@@ -2,10 +2,10 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// Hears how far a build is, and may stop it.
+/// Receives the progress of a build, and may stop it.
 ///
-/// Asked from the threads of the build, often and in any order. An [`AtomicBool`] is a monitor that stops builds from when it
-/// is true; `()` watches nothing.
+/// Called from the threads of the build, often and in any order. An [`AtomicBool`] is a monitor that stops builds from
+/// when it is true; `()` watches nothing.
 ///
 /// ```
 /// use antumbra::{Build, BuildMonitor, Error, Geometry};

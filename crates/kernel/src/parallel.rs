@@ -1,5 +1,5 @@
-//! Work on several threads, or on one when the `parallel` feature is off. Callers divide the work by
-//! counts alone, so what they compute does not depend on the number of threads.
+//! Work on several threads, or on one when the `parallel` feature is off. Callers divide the work only by counts, so
+//! what they compute does not depend on the number of threads.
 
 use alloc::vec::Vec;
 use core::mem;
@@ -68,7 +68,7 @@ fn for_each_mut<T>(items: &mut [T], work: &dyn Fn(usize, &mut T)) {
         .for_each(|(index, item)| work(index, item));
 }
 
-/// Runs `work` on every number. It is compiled once: what rayon has for iterators is compiled anew for every closure
+/// Runs `work` on every number. It is compiled once: what rayon has for iterators is compiled again for every closure
 /// and was a quarter of this crate's code.
 #[cfg(feature = "parallel")]
 fn run(numbers: Range<usize>, work: &(dyn Fn(usize) + Sync)) {
@@ -117,7 +117,7 @@ pub(crate) fn chunk_len(count: usize) -> usize {
     count.div_ceil(MAX_CHUNKS).max(MIN_CHUNK)
 }
 
-/// `count` items, of which `work` writes a chunk of `chunk` at a time where they are to stand, given their places.
+/// `count` items. `work` writes chunks of `chunk` items, given their places, to where they belong in the list.
 pub(crate) fn fill<T: Send>(
     count: usize,
     chunk: usize,

@@ -6,12 +6,13 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::ray::{Hit, Ray};
 
-// SAFETY: `repr(C)` and made of eight `f32` alone, 32 bytes as the tests of `ray` check: no padding, any bits are a value.
+// SAFETY: `repr(C)` and made only of eight `f32`, 32 bytes as the tests of `ray` check: no padding, any bits are a
+// value.
 unsafe impl Zeroable for Ray {}
 // SAFETY: as above.
 unsafe impl Pod for Ray {}
 
-// SAFETY: `repr(C)` and made of three `f32` and three `u32` alone, 24 bytes as the tests of `ray` check: no padding, any
+// SAFETY: `repr(C)` and made only of three `f32` and three `u32`, 24 bytes as the tests of `ray` check: no padding, any
 // bits are a value.
 unsafe impl Zeroable for Hit {}
 // SAFETY: as above.

@@ -113,7 +113,7 @@ fn next_up(t: f32) -> f32 {
     if next.is_subnormal() { 0.0 } else { next }
 }
 
-/// Where a ray meets the closest primitive.
+/// Where a ray hits the closest primitive.
 ///
 /// Of several primitives at equal distance the one of the smallest (inst_id, geom_id, prim_id) is hit. Primitives in the
 /// world itself come after those in instances, because [`INVALID_ID`] is the largest number.
@@ -139,11 +139,11 @@ fn next_up(t: f32) -> f32 {
 pub struct Hit {
     /// Distance along the ray in multiples of its direction.
     pub t: f32,
-    /// Barycentric weight of the triangle's second corner; 0 without corners; of a [quad](crate::QuadMesh) the place from corner 0
-    /// to corner 1; what [user geometry](crate::UserGeometry) tells.
+    /// Barycentric weight of the triangle's second corner; 0 without corners; of a [quad](crate::QuadMesh) the place
+    /// from corner 0 to corner 1; what [user geometry](crate::UserGeometry) returns.
     pub u: f32,
-    /// Barycentric weight of the triangle's third corner; 0 without corners; of a quad the place from corner 0 to corner 3; what user
-    /// geometry tells.
+    /// Barycentric weight of the triangle's third corner; 0 without corners; of a quad the place from corner 0 to
+    /// corner 3; what user geometry returns.
     pub v: f32,
     /// Index of the primitive in its geometry.
     pub prim_id: u32,

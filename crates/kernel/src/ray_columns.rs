@@ -72,7 +72,7 @@ impl<'a> Rays<'a> {
         }
     }
 
-    /// Replaces what is in `rays` by those of these indices.
+    /// Replaces the contents of `rays` by the rays of these indices.
     pub(crate) fn pick(&self, indices: impl Iterator<Item = usize>, rays: &mut Vec<Ray>) {
         rays.clear();
         match self {
@@ -82,7 +82,8 @@ impl<'a> Rays<'a> {
     }
 }
 
-/// Numbers in memory that belong to the caller, some for each ray: those of ray `i` begin at `values[i * stride]`.
+/// Numbers in memory that belong to the caller, some for each ray. The numbers of ray `i` begin at
+/// `values[i * stride]`.
 ///
 /// | memory | column |
 /// |---|---|
@@ -259,7 +260,7 @@ impl Distance<'_> {
     }
 }
 
-/// Rays in separate arrays, read where they lie. Fields are those of [`Ray`].
+/// Rays in separate arrays, read where they are. The fields are the fields of [`Ray`].
 ///
 /// The arrays are brought together a few thousand rays at a time, in memory that stays in the cache.
 ///
