@@ -58,7 +58,7 @@ pub struct Build<'a> {
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub enum Source<'a> {
-    /// Geometries, to be checked.
+    /// Geometries, which the build checks and copies.
     Geometries(&'a [Geometry<'a>]),
     /// Primitives, with [instances](Primitives::with_instances) if there are any.
     Primitives(&'a Primitives),
@@ -87,7 +87,7 @@ impl<'a> Build<'a> {
 
     /// Learns from `rays`: a few thousand rays like those to come, in the space of the geometry.
     ///
-    /// Rays that cannot hit anything teach nothing. Learning pays where rays differ from surface rays, synthetic rays
+    /// Rays that cannot hit anything are left out. Learning pays where rays differ from surface rays, synthetic rays
     /// between surfaces, from which every tree learns by default. Answers stay the same.
     pub fn rays(self, rays: &'a [Ray]) -> Self {
         Self { rays, ..self }

@@ -50,7 +50,7 @@ pub struct Bvh {
     pub(crate) dropped: usize,
     pub(crate) transparent: usize,
     pub(crate) pool: Pool,
-    /// See [`Bvh::prefetches`].
+    /// Whether batches prefetch, see [`Bvh::prefetches`].
     pub(crate) prefetch: bool,
     /// Fields of the [report](super::report::BuildReport).
     pub(crate) predicted_cost: Option<f64>,
@@ -89,7 +89,7 @@ impl Bvh {
         Self::fresh(tree, isa, &Primitives::default())
     }
 
-    /// Children per node.
+    /// Largest number of children of a node: 4, 8 or 16.
     #[must_use]
     pub fn width(&self) -> Width {
         match &self.tree {

@@ -10,7 +10,7 @@ use crate::tree::any::on_tree;
 use crate::tree::node::{Child, ChildKind};
 use crate::tree::wide::WideTree;
 
-/// Nodes that fewer than one of so many rays visited are left out: they are many, and save next to nothing.
+/// Nodes that fewer than one of this many rays visited are left out: they are many, and save next to nothing.
 const RARE: u64 = 256;
 
 /// The order of children that a tree [learned](Bvh::relearn), for [copies](Bvh::adopt) of the tree.
@@ -101,14 +101,15 @@ fn from_here(child: Child, node: usize) -> Child {
 /// Places of the items of a top level in an order that was learned.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Ranks {
-    /// By subtree of the ground.
+    /// Rank of each subtree of the ground.
     pub ground: Vec<u32>,
-    /// By instance.
+    /// Rank of each instance.
     pub instances: Vec<u32>,
 }
 
 impl Ranks {
-    /// Ranks of so many items of the ground and instances behind them; none if nothing was learned. What is new comes last.
+    /// Ranks of this many items of the ground, followed by the ranks of instances. Empty if nothing was learned. New
+    /// items come last.
     pub fn of(&self, ground: usize, instances: usize) -> Vec<u32> {
         let known = self.ground.len() + self.instances.len();
         let ranks = |ranks: &[u32], count: usize| -> Vec<u32> {

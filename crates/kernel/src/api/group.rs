@@ -23,7 +23,7 @@ const RAYS: usize = 1 << 20;
 /// Points that are taken at a time at most, however few directions there are.
 const MOST_POINTS: usize = 1 << 12;
 
-/// Directions that many points look in, made ready once: a year of suns, the patches of a sky.
+/// Directions that many points share, prepared once: a year of suns, the patches of a sky.
 ///
 /// Directions are sorted along a curve over the sphere, so that rays of neighbouring directions go through the tree together.
 /// Results are in the order given.
@@ -58,7 +58,7 @@ impl Directions {
         }
     }
 
-    /// Number of directions.
+    /// Number of directions, which is the number of columns of a [`Group`].
     #[must_use]
     pub fn len(&self) -> usize {
         self.given.len()

@@ -54,7 +54,7 @@ use crate::tree::motion::Keys;
 /// [`MovingScene::at`] the time in question.
 #[derive(Clone)]
 pub struct MovingBvh {
-    /// One tree for each span.
+    /// One tree for each span between two keys.
     spans: Vec<Bvh>,
 }
 
@@ -118,7 +118,7 @@ impl MovingBvh {
         Ok(Self { spans })
     }
 
-    /// Spans between two keys.
+    /// Returns the number of spans between two keys, each of which has a tree.
     #[must_use]
     pub fn spans(&self) -> usize {
         self.spans.len()

@@ -281,8 +281,8 @@ impl Bvh {
         on_tree!(&self.tree, tree => self.isa.dispatch(Search { tree, point, memory, seeker }));
     }
 
-    /// Answers every point by what is nearest to it. One thread takes neighbours one after the other, and guesses that what was
-    /// nearest to one point is about as far away as what is nearest to the next.
+    /// Answers every point by the primitive nearest to it. One thread takes neighbours one after the other, and guesses
+    /// that the distance changes little from one point to the next.
     fn closest_each<A: Send>(
         &self,
         points: &[[f32; 3]],

@@ -14,11 +14,12 @@ use crate::ray::Ray;
 use crate::trace::memory::Memory;
 use crate::trace::ray_batch::RayBatch;
 
-/// Rays between two looks at the clock: four times as many as a stream has in flight.
+/// Rays between two readings of the clock: four times as many as a stream has in flight.
 const CHUNK: usize = 256;
 
-/// Requests are given up if three of four measurements are this much faster without them, and no less: a few rays find more
-/// in the caches than many, and no tree was found yet that is slower with requests beyond noise.
+/// Batches stop prefetching if three of four measurements are at least this many times as fast without. The bound is
+/// above 1, because a few rays find more in the caches than many, and no tree was found yet that is slower with
+/// prefetching beyond noise.
 const GAIN: f64 = 1.03;
 
 impl Bvh {
@@ -64,7 +65,7 @@ impl Bvh {
         };
         let mut gains = Vec::with_capacity(rays.len() / (2 * CHUNK));
         for pair in rays.chunks_exact(2 * CHUNK) {
-            // Both ways come to a cache that knows the rays once, and once to one that does not.
+            // Each setting is timed once on rays that the cache knows, and once on rays that it does not know.
             let (first, second) = pair.split_at(CHUNK);
             let mut with = seconds(true, first);
             let mut without = seconds(false, first);

@@ -60,13 +60,13 @@ impl Bvh {
         }
     }
 
-    /// Follows rays to their ends, whatever they hit on the way, and writes down what they meet.
+    /// Follows rays to their ends, whatever they hit on the way, and logs the boxes and occluders that they hit.
     pub(crate) fn follow(&self, rays: &[Ray], log: &mut RayLog) {
         let mut occluded = vec![false; rays.len()];
         self.observe(Pick::Slots, &mut Following::new(log), rays, &mut occluded);
     }
 
-    /// Occlusion of many rays, in the way that is fastest for so many.
+    /// Occlusion of many rays, in a stream or ray by ray, whichever is faster for this number.
     pub(crate) fn occluded_many(
         &self,
         memory: &mut Memory,
@@ -141,8 +141,8 @@ impl Bvh {
         }
     }
 
-    /// Whether so many rays are answered sooner in a stream. Without vectors a step is long enough to fill the CPU on its
-    /// own: ray by ray is 1.3 times as fast (sponza, 4 wide).
+    /// Whether this many rays are answered sooner in a stream. Without vectors a step is long enough to fill the CPU by
+    /// itself: ray by ray is 1.3 times as fast (sponza, 4 wide).
     pub(super) fn is_worth_a_stream(&self, rays: usize) -> bool {
         rays >= FEW && self.isa().level() != Level::Scalar
     }

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use crate::hash;
 use crate::ray::Ray;
 
-/// A fair sample of the rays of many batches: each ray that was shown is in it with the same chance.
+/// A uniform sample of the rays of many batches: each ray that was shown is in it with the same chance.
 ///
 /// Keeps at most so many rays, 32 bytes each. The sample depends on the rays, on their order and on nothing else.
 ///
@@ -67,7 +67,7 @@ impl RayMemory {
         self.shown = total;
     }
 
-    /// The sample.
+    /// Returns the rays of the sample.
     pub fn rays(&self) -> &[Ray] {
         &self.rays
     }
@@ -78,7 +78,7 @@ impl RayMemory {
         self.shown = self.shown.max(self.rays.len() as u64);
     }
 
-    /// A number in 0..1.
+    /// The next random number in [0, 1).
     fn unit(&mut self) -> f64 {
         self.state = self.state.wrapping_add(hash::STEP);
         (hash::mixed(self.state) >> 11) as f64 / (1_u64 << 53) as f64

@@ -26,28 +26,28 @@ use antumbra_simd::named_list;
 #[derive(Clone, Copy, Debug)]
 #[non_exhaustive]
 pub struct Recipe {
-    /// How the binary tree is built.
+    /// How the binary tree is built. Default: [`Builder::Reinsertion`].
     pub builder: Builder,
-    /// How it is made wide.
+    /// How the binary tree is made wide. Default: [`Collapse::Learned`].
     pub collapse: Collapse,
-    /// In which order occlusion rays visit children.
+    /// In which order occlusion rays visit children. Default: [`Order::Joint`].
     pub order: Order,
-    /// Children per node.
+    /// Children per node. Default: the number that suits the instruction set.
     pub width: Width,
-    /// Instruction set that queries run on.
+    /// Instruction set that queries run on. Default: the best of this CPU.
     pub isa: Isa,
-    /// What steps of a traversal cost, in units of the caller's choice.
+    /// Costs of the steps of a traversal, in units of the caller's choice. Default: [`CostModel::default`].
     pub costs: CostModel,
-    /// What is learned from, beside the rays that are given.
+    /// Which rays are learned from, how many surface rays are made, and the seed of learning.
     pub training: Training,
-    /// Whether batches fetch nodes and leaves before their turn. `None`: where there are training rays and a
-    /// [clock](Recipe::clock), a short timing decides; otherwise they do.
+    /// Whether batches prefetch nodes and leaves. With `None`, a short timing decides if there are training rays and a
+    /// [clock](Recipe::clock). Otherwise batches prefetch.
     pub prefetch: Option<bool>,
     /// Clock by which the steps are timed for [`BuildReport`](crate::BuildReport); the kernel has none of its own.
     pub clock: Option<Clock>,
 }
 
-/// What a tree learns from, beside the rays that are given.
+/// Which rays a tree learns from, how many surface rays are made, and the seed of learning.
 ///
 /// ```
 /// use antumbra::Recipe;
@@ -116,7 +116,7 @@ named_list! {
 }
 
 impl Preset {
-    /// The recipe of this name.
+    /// Returns the recipe that this preset names.
     pub fn recipe(self) -> Recipe {
         self.properties()()
     }
@@ -174,17 +174,17 @@ impl Recipe {
         Self { builder, ..self }
     }
 
-    /// With another collapse.
+    /// Sets the collapse. Default: [`Collapse::Learned`].
     pub fn collapse(self, collapse: Collapse) -> Self {
         Self { collapse, ..self }
     }
 
-    /// With another child order.
+    /// Sets the child order. Default: [`Order::Joint`].
     pub fn order(self, order: Order) -> Self {
         Self { order, ..self }
     }
 
-    /// With another number of children per node.
+    /// Sets the number of children per node. Default: the number that suits the instruction set.
     pub fn width(self, width: Width) -> Self {
         Self { width, ..self }
     }
@@ -198,18 +198,18 @@ impl Recipe {
         }
     }
 
-    /// With other costs of the steps of a traversal.
+    /// Sets the costs of the steps of a traversal. Default: [`CostModel::default`].
     pub fn costs(self, costs: CostModel) -> Self {
         Self { costs, ..self }
     }
 
-    /// Learning from other rays.
+    /// Sets which rays are learned from. Default: [`TrainingRays::Both`].
     pub fn training_rays(mut self, rays: TrainingRays) -> Self {
         self.training.rays = rays;
         self
     }
 
-    /// Learning from so many surface rays; `None` for a number that suits the size of the scene.
+    /// Sets the number of surface rays. `None`, the default, is a number that suits the size of the scene.
     pub fn surface_rays(mut self, count: Option<usize>) -> Self {
         self.training.surface_rays = count;
         self
@@ -221,12 +221,12 @@ impl Recipe {
         self
     }
 
-    /// With batches that prefetch or do not; `None` to try it on the training rays where there is a clock.
+    /// Sets whether batches prefetch. `None`, the default, times it on the training rays if there is a clock.
     pub fn prefetch(self, prefetch: Option<bool>) -> Self {
         Self { prefetch, ..self }
     }
 
-    /// Timing its steps by a clock, or not.
+    /// Sets the clock that times the steps of the build. Default: `None`, and the steps are not timed.
     pub fn clock(self, clock: Option<Clock>) -> Self {
         Self { clock, ..self }
     }

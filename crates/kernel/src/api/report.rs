@@ -5,7 +5,7 @@ use super::times::BuildTimes;
 use crate::tree::any::on_tree;
 use crate::tree::costs::CostModel;
 
-/// What was built.
+/// Size, cost and build times of a tree, returned by [`Bvh::report`].
 ///
 /// ```
 /// # use antumbra::{Bvh, Geometry, Recipe};
@@ -34,9 +34,9 @@ pub struct BuildReport {
     pub dropped: usize,
     /// Triangles left out because they are clear: see [`crate::cutout::Coverage`].
     pub transparent: usize,
-    /// N-wide nodes.
+    /// Nodes of up to [`Bvh::width`] children each.
     pub nodes: usize,
-    /// Leaf blocks.
+    /// Leaf blocks, without the empty one that empty slots refer to.
     pub leaves: usize,
     /// Levels of nodes; the root is one. With instances, levels of the world's tree and of the deepest object together.
     pub depth: usize,
@@ -53,14 +53,14 @@ pub struct BuildReport {
     pub predicted_cost_before: Option<f64>,
     /// Rays that the child order was learned from.
     pub training_rays: u64,
-    /// Whether batches fetch nodes and leaves before their turn: see [`Recipe::prefetch`](crate::Recipe::prefetch).
+    /// Whether batches prefetch nodes and leaves: see [`Recipe::prefetch`](crate::Recipe::prefetch).
     pub prefetches: bool,
     /// Times of the steps; `None` without a [clock](crate::Recipe::clock).
     pub times: Option<BuildTimes>,
 }
 
 impl Bvh {
-    /// What was built.
+    /// Returns size, cost and build times of this tree.
     #[must_use]
     pub fn report(&self) -> BuildReport {
         on_tree!(&self.tree, tree => BuildReport {

@@ -17,8 +17,8 @@ use crate::trace::surface::{Surface, surface, unit};
 use crate::tree::any::on_tree;
 use crate::tree::rule::Rule;
 
-/// Items of a stack on the program stack: enough for 32 levels of 16 children, 71 of 8 and 167 of 4. Nobody writes to
-/// what a tree does not need. Deeper trees take their stack from the pool.
+/// Items of a stack on the program stack: enough for 32 levels of 16 children, 71 of 8 and 167 of 4. Items that a tree
+/// does not need are not written. Deeper trees take their stack from the pool.
 const ITEMS: usize = 512;
 
 impl Bvh {

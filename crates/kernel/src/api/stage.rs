@@ -307,8 +307,8 @@ fn driving_rays<'a>(primitives: &Primitives, rays: &'a [Ray], recipe: &Recipe) -
     }
 }
 
-/// Surface rays among the rays that a child order learns from: one for so many rays given. Without any, orders learned from
-/// shadow rays make ambient occlusion rays up to 1.17 times as dear. See `docs/notes/kernel.md`.
+/// Given rays per surface ray among the rays that a child order learns from. Without any surface rays, orders learned
+/// from shadow rays make ambient occlusion rays up to 1.17 times as expensive. See `docs/notes/kernel.md`.
 const GIVEN_PER_SURFACE_RAY: usize = 4;
 
 /// Rays that the child order is learned from; none for an order that does not learn.

@@ -5,7 +5,7 @@ use core::time::Duration;
 /// Clock of a build: returns the time since a fixed moment, such as the start of the program.
 pub type Clock = fn() -> Duration;
 
-/// How long the steps of [`Bvh::learn`](crate::Bvh::learn) took.
+/// Time that each step of [`Bvh::learn`](crate::Bvh::learn) took.
 ///
 /// ```
 /// use std::sync::LazyLock;
@@ -36,16 +36,16 @@ pub struct BuildTimes {
     pub collapse: Duration,
     /// Following training rays through the wide tree.
     pub order_log: Duration,
-    /// Working out the child order and applying it.
+    /// Computing the child order and applying it.
     pub order: Duration,
-    /// Predicting what a ray costs before and after.
+    /// Predicting the mean cost of a ray before and after the order is applied.
     pub predict: Duration,
-    /// Trying whether to prefetch.
+    /// Timing batches with and without prefetching.
     pub prefetch: Duration,
 }
 
 impl BuildTimes {
-    /// Sum of all steps.
+    /// Returns the sum of all steps.
     pub fn total(&self) -> Duration {
         let Self {
             primitives,

@@ -116,17 +116,17 @@ impl Batch<'_> {
     }
 }
 
-/// Rays whose visit goes on.
+/// Rays whose visit has not ended.
 struct Open {
     rays: Vec<Ray>,
-    /// Their places.
+    /// Per ray, its place in this part of the batch.
     keys: Vec<Key>,
-    /// The hit of each behind which its visit goes on.
+    /// Per ray, the hit behind which its visit continues.
     after: Vec<Hit>,
 }
 
 impl Open {
-    /// All of these rays.
+    /// Opens the visits of all these rays.
     fn new(rays: Vec<Ray>) -> Self {
         /// A hit before all hits.
         const FIRST: Hit = Hit {
@@ -145,7 +145,8 @@ impl Open {
         RayBatch::by_keys(&self.rays, first, &self.keys)
     }
 
-    /// Keeps the rays for which there is a hit behind which the visit goes on. `goes_on` is called with indices and places.
+    /// Keeps the rays whose visit continues behind a hit. `goes_on` is called with index and place of each ray, and
+    /// returns that hit.
     fn retain(&mut self, mut goes_on: impl FnMut(usize, usize) -> Option<Hit>) {
         let mut next = 0;
         for index in 0..self.rays.len() {

@@ -12,7 +12,7 @@ use crate::tree::node::{Child, ChildKind, Node};
 use crate::tree::refit::TreePlaces;
 use crate::tree::wide::WideTree;
 
-/// The ground is taken apart into at least so many subtrees, and one per instance up to [`MOST_SUBTREES`].
+/// The ground is taken apart into at least this many subtrees, and one per instance up to [`MOST_SUBTREES`].
 const SUBTREES: usize = 64;
 const MOST_SUBTREES: usize = 1024;
 
@@ -32,7 +32,7 @@ pub(super) struct Ground {
 }
 
 impl Ground {
-    /// Takes a tree apart that has joined, for so many instances.
+    /// Takes apart a tree that has joined, for this number of instances.
     pub fn new<const N: usize>(tree: &mut WideTree<N>, joined: Joined, instances: usize) -> Self {
         let count = instances.clamp(SUBTREES, MOST_SUBTREES);
         let whole = (Child::inner(joined.places.nodes.start), tree.bounds);
@@ -52,7 +52,7 @@ impl Ground {
         }
     }
 
-    /// Follows its tree, which moved so many places back.
+    /// Adjusts the places after the tree moved back by `by` nodes.
     pub fn move_back(&mut self, by: usize) {
         let nodes = &mut self.places.nodes;
         *nodes = nodes.start + by..nodes.end + by;

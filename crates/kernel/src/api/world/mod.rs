@@ -80,14 +80,14 @@ pub struct World {
     dropped_before: usize,
 }
 
-/// An object in a world.
+/// An object whose tree was copied into the world's.
 #[derive(Clone, Debug)]
 struct Joined {
     places: TreePlaces,
     shape: ObjectShape,
     /// Primitives that a refit must find sound.
     kept: usize,
-    /// Weight of an instance.
+    /// Weight of an instance of the object in the top level.
     weight: f32,
     depth: usize,
     /// Expected cost before the first refit.
