@@ -19,31 +19,31 @@ use crate::shape::Shape;
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Error {
-    /// A triangle names a vertex that is not there.
+    /// A triangle has the index of a vertex that does not exist.
     IndexOutOfRange {
-        /// The geometry.
+        /// Index of the geometry.
         geom_id: u32,
-        /// The triangle.
+        /// Index of the triangle in its geometry.
         prim_id: u32,
         /// The index found.
         index: u32,
         /// Indices must be below this.
         vertices: usize,
     },
-    /// A quad names a vertex that is not there.
+    /// A quad has the index of a vertex that does not exist.
     QuadIndexOutOfRange {
-        /// The geometry.
+        /// Index of the geometry.
         geom_id: u32,
-        /// The quad.
+        /// Index of the quad in its geometry.
         prim_id: u32,
         /// The index found.
         index: u32,
         /// Indices must be below this.
         vertices: usize,
     },
-    /// An instance names an object that is not there.
+    /// An instance has the index of an object that does not exist.
     ObjectOutOfRange {
-        /// The instance.
+        /// Index of the instance.
         inst_id: u32,
         /// The index found.
         object: u32,
@@ -52,7 +52,7 @@ pub enum Error {
     },
     /// An object holds an instance of itself, or of an object that holds it.
     NestsItself {
-        /// The object.
+        /// Index of the object.
         object: u32,
     },
     /// More geometries or primitives than 32-bit ids, or leaf references, can name.
@@ -70,7 +70,7 @@ pub enum Error {
         what: &'static str,
         /// Numbers that the rays need.
         needed: usize,
-        /// Numbers that there are.
+        /// Numbers that the column has.
         found: usize,
     },
     /// A file was read with too few or too many [functions](crate::Functions).
@@ -101,7 +101,7 @@ pub enum Error {
     OtherKeys {
         /// Singular of what has the keys.
         what: &'static str,
-        /// Its number.
+        /// Index of the mesh or instance.
         id: u32,
         /// Keys of the others.
         expected: usize,
@@ -110,7 +110,7 @@ pub enum Error {
     },
     /// A key of a mesh that moves has another number of vertices than the first one.
     OtherVertices {
-        /// The geometry.
+        /// Index of the geometry.
         geom_id: u32,
         /// The key, counted from 0.
         key: u32,
@@ -121,48 +121,48 @@ pub enum Error {
     },
     /// A vertex of a mesh that moves is not finite, or beyond 2¹²⁵.
     KeyPosition {
-        /// The geometry.
+        /// Index of the geometry.
         geom_id: u32,
         /// The key, counted from 0.
         key: u32,
-        /// The vertex.
+        /// Index of the vertex in its key.
         vertex: usize,
-        /// Its position.
+        /// Position of the vertex.
         position: [f32; 3],
     },
     /// A transform of an instance that moves has a number that is not finite, or no inverse.
     KeyTransform {
-        /// The instance.
+        /// Index of the instance.
         inst_id: u32,
         /// The key, counted from 0.
         key: u32,
     },
-    /// One of two transforms of an instance mirrors and the other does not, so that there is no way between.
+    /// One of two transforms of an instance mirrors and the other does not, so that there is no motion between them.
     KeysMirror {
-        /// The instance.
+        /// Index of the instance.
         inst_id: u32,
         /// The first of the two keys, counted from 0.
         key: u32,
     },
     /// The path of an instance leaves the range of `f32`.
     OutOfRange {
-        /// The instance.
+        /// Index of the instance.
         inst_id: u32,
     },
     /// A build was stopped by its [monitor](crate::BuildMonitor).
     Cancelled,
     /// A refit got another number of sound primitives than the tree was built over.
     OtherPrimitives {
-        /// How many the tree was built over.
+        /// Number of sound primitives that the tree was built over.
         expected: usize,
-        /// How many were found.
+        /// Number of sound primitives found.
         found: usize,
     },
-    /// A primitive of the tree is not there any more, or not sound any more, when the tree is refitted.
+    /// A primitive of the tree does not exist any more, or is not sound any more, when the tree is refitted.
     PrimitiveIsGone {
-        /// The geometry.
+        /// Index of the geometry.
         geom_id: u32,
-        /// The primitive.
+        /// Index of the primitive in its geometry.
         prim_id: u32,
     },
     /// A tree with instances was to be refitted: a [`World`](crate::World) refits its objects.

@@ -29,10 +29,10 @@ use core::sync::atomic::{AtomicBool, Ordering};
 /// assert_eq!(stopped.err(), Some(Error::Cancelled));
 /// ```
 pub trait BuildMonitor: Sync {
-    /// So much of the build is done: from 0 to 1, never less than before. A rough estimate of the time.
+    /// Receives the share of the build that is done: from 0 to 1, never less than before. A rough estimate of the time.
     fn progress(&self, _done: f32) {}
 
-    /// Whether to give up.
+    /// Returns whether the build should stop. Default: `false`.
     fn cancelled(&self) -> bool {
         false
     }

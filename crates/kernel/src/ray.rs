@@ -36,7 +36,7 @@ pub const INVALID_ID: u32 = u32::MAX;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C)]
 pub struct Ray {
-    /// Origin.
+    /// Origin of the ray.
     pub org: [f32; 3],
     /// Excluded lower end of the interval, in multiples of `dir`.
     pub tnear: f32,

@@ -215,7 +215,7 @@ impl<'a> From<&'a [f32]> for Column<'a> {
 pub enum Distance<'a> {
     /// One value for every ray or point.
     Same(f32),
-    /// One number for each ray or point.
+    /// A value of its own for each ray or point.
     Each(Column<'a>),
 }
 
@@ -289,7 +289,7 @@ pub struct RayColumns<'a> {
 }
 
 impl<'a> RayColumns<'a> {
-    /// So many rays over the interval (0, ∞).
+    /// A list of `len` rays over the interval (0, ∞).
     ///
     /// # Errors
     /// [`Error::TooShort`] if a column has too few numbers.

@@ -40,13 +40,13 @@ impl Cost {
         of_blocks(blocks)
     }
 
-    /// The estimate for so many primitives in a box.
+    /// The estimate for `count` primitives in a box.
     #[cfg(feature = "lab")]
     pub fn of_box(&self, bounds: &Aabb, count: usize) -> f32 {
         bounds.half_area() * self.weight_of(count)
     }
 
-    /// Weight of so many primitives.
+    /// Weight of `count` primitives.
     #[inline(always)]
     pub fn weight_of(&self, count: usize) -> f32 {
         match self.table.get(count) {
@@ -56,7 +56,7 @@ impl Cost {
     }
 }
 
-/// Weight of so many leaf blocks.
+/// Weight of this many leaf blocks.
 fn of_blocks(blocks: f32) -> f32 {
     math::sqrt_f32(blocks * math::sqrt_f32(blocks))
 }
@@ -65,10 +65,10 @@ fn of_blocks(blocks: f32) -> f32 {
 pub(crate) trait Weigh {
     type Sum: Copy + Default + AddAssign;
 
-    /// As many items are a leaf.
+    /// Largest number of items in a leaf.
     const LEAF: usize;
 
-    /// Summand of an item.
+    /// What an item adds to the sum of its side.
     fn item(&self, item: &Planes) -> Self::Sum;
 
     /// Weight of a sum.

@@ -13,8 +13,8 @@ use crate::geometry::primitives::Primitives;
 use crate::learn::tree_log::{NodeCounts, TreeLog};
 use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 
-/// Leaves are looked at if so many times as many rays come to them as to a leaf in the mean. Others are not worth a
-/// second leaf block, nor the time to look for a split.
+/// Leaves are candidates if this many times as many rays come to them as to a leaf in the mean. Other leaves do not
+/// repay a second leaf block, nor the time to search for a split.
 const HEAVY: f32 = 4.0;
 /// Cost of a leaf block in nodes, however many lanes are in use: see `docs/src/performance.md`.
 const BLOCK_COST: f32 = 2.0;

@@ -1,5 +1,5 @@
-//! Orders that look at the ray: by the distance of boxes, by a way that each node has of its own, or by the direction
-//! of the ray, from a table of permutations beside the nodes.
+//! Orders that depend on the ray: by the distance of boxes, by a rule of each node, or by the direction of the ray,
+//! from a table of permutations beside the nodes.
 
 use alloc::format;
 use alloc::vec::Vec;
@@ -13,14 +13,14 @@ use crate::geometry::ray_setup::{RaySetup, max};
 use crate::tree::node::Node;
 use crate::tree::words::{Sink, Words};
 
-/// How an occlusion query looks at the ray to pick the next child.
+/// How an occlusion query picks the next child by the ray.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum ByRay {
     /// By the distance at which boxes are entered, nearest first.
     Distance,
     /// By the distance at which boxes are left, farthest first.
     Far,
-    /// By a way that each node has of its own.
+    /// By the rule of each node.
     Nodes(Vec<Way>),
     /// By one of several orders that a node has, chosen by the signs of the ray's direction.
     Direction(DirectedOrder),
@@ -121,11 +121,11 @@ impl ByRay {
     }
 }
 
-/// How one node picks.
+/// Rule by which one node picks its next child.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Way {
-    /// In the order of slots.
+    /// The order of slots.
     #[default]
     Slots,
     /// Boxes that are entered first come first.
@@ -142,7 +142,7 @@ impl Way {
 /// on an axis that every node chooses for itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct DirectedOrder {
-    /// How many a node has.
+    /// Orders per node: 2 or 8.
     orders: usize,
     /// Per node, which bit of the octant is the lowest that decides.
     shifts: Vec<u8>,
@@ -185,7 +185,7 @@ impl DirectedOrder {
         sink.bytes(&self.lanes);
     }
 
-    /// Orders for so many nodes, as [`DirectedOrder::write`] wrote them.
+    /// Orders for this number of nodes, as [`DirectedOrder::write`] wrote them.
     fn read(words: &mut Words<'_>, nodes: usize, width: usize) -> Result<Self, Error> {
         let orders = words.word()? as usize;
         let most_shift = match orders {

@@ -93,7 +93,7 @@ pub trait Laboratory: Sized {
     fn predicted_by(&self, log: &Log, model: &CostModel, events: Events) -> Result<f64, Error>;
 
     /// Has each node pick its children by the order of slots, near first or far first, whichever costs these rays
-    /// least. Returns the number of nodes that pick in each of these ways. Queries become ray by ray.
+    /// least. Returns the number of nodes with each of these rules. Queries become ray by ray.
     fn learn_ways(&mut self, rays: &[Ray], costs: &CostModel) -> [usize; 3];
 
     /// Puts children and primitives where `order` wants them. A log made before counts the old slots and is of no

@@ -8,17 +8,17 @@ use crate::learn::ray_log::{RayLog, Visit};
 use crate::tree::node::ChildKind;
 use crate::tree::wide::WideTree;
 
-/// Node tests of occlusion queries, apart for rays that are occluded and rays that are not. A node test is one
-/// of all N boxes of a node.
+/// Node tests of occlusion queries, counted separately for rays that are occluded and rays that are not. A node test is
+/// one of all N boxes of a node.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Visits {
-    /// Rays that are occluded.
+    /// Number of rays that are occluded.
     pub occluded_rays: u64,
-    /// Node tests of those rays together.
+    /// Sum of the node tests of those rays.
     pub occluded_tests: u64,
-    /// Rays that are not, also those that cannot hit anything and test nothing.
+    /// Number of rays that are not occluded, also those that cannot hit anything and test nothing.
     pub unoccluded_rays: u64,
-    /// Node tests of those rays together.
+    /// Sum of the node tests of those rays.
     pub unoccluded_tests: u64,
 }
 

@@ -1,5 +1,5 @@
-//! A way of picking for each node: in the order of slots, by the distance at which boxes are entered, or by that at which
-//! they are left, the farthest first. The way that costs the training rays least is taken.
+//! A rule for each node to pick children: in the order of slots, by the distance at which boxes are entered, or by the
+//! distance at which they are left, the farthest first. Each node takes the rule that costs the training rays least.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -13,10 +13,10 @@ use crate::trace::observe::{NodeVisit, Observer, Place};
 use crate::tree::costs::CostModel;
 use crate::tree::wide::WideTree;
 
-/// A way other than the order of slots is taken where it saves this share of the cost: sorting takes time, and few rays
-/// prove little.
+/// A rule other than the order of slots is taken where it saves this share of the cost: sorting takes time, and few
+/// rays prove little.
 const WORTH: f64 = 0.02;
-/// Fewer rays than this decide nothing.
+/// With fewer rays than this a node keeps the order of slots.
 const FEW: usize = 8;
 
 /// Slots in the order of a visit, four bits each, the first one lowest.
@@ -91,7 +91,7 @@ impl<const N: usize> Observer for Measuring<'_, N> {
     }
 }
 
-/// The [`Way`] of every node that costs the rays least, in a tree whose slots are in their order.
+/// The rule of every node that costs the rays least, in a tree whose slots are in their order.
 pub(crate) fn learn_ways<const N: usize>(
     bvh: &WideTree<N>,
     distances: &Distances,
@@ -131,7 +131,7 @@ fn sort_all<const N: usize>(learner: &mut Learner<'_, N>, distances: &Distances)
     ways
 }
 
-/// The slots of a visit in the order of a way.
+/// The slots of a visit in the order of a rule.
 fn slots_of<const N: usize>(
     hit: u16,
     visit: usize,
@@ -150,7 +150,7 @@ fn slots_of<const N: usize>(
     (0..count).map(move |place| (packed >> (4 * place) & 15) as usize)
 }
 
-/// Cost of a ray in a node whose children come in the order of a way.
+/// Cost of a ray in a node whose children are visited by a rule.
 fn cost<const N: usize>(
     costs: &[f64; N],
     passage: &Passage<N>,
@@ -167,7 +167,7 @@ fn cost<const N: usize>(
     sum
 }
 
-/// Finds out how far the rays come by these ways.
+/// Finds out which visits the rays reach by these rules.
 fn trace<const N: usize>(learner: &mut Learner<'_, N>, distances: &Distances, ways: &[Way]) {
     // A visit comes before the visits below it.
     for (place, visit) in learner.visits.iter().enumerate() {

@@ -176,11 +176,11 @@ impl TreeLog {
         log
     }
 
-    /// What `rays` should weigh that a tree is made for, in a log of [surface rays](Self::of_surfaces) or of nothing yet: each
-    /// as much as a surface ray, but together at least as much as all of those, which are there so that what these rays do
-    /// not visit is not forgotten. With half of the weight for surface rays, shadow rays test up to 4 % more nodes (sibenik)
-    /// when 64 thousand rays were learned from, up to 12 % (bathroom) when it was 16 thousand; with a tenth or a fiftieth it
-    /// is the same to 2 %.
+    /// Weight of `rays`, the rays that a tree is made for, in a log of [surface rays](Self::of_surfaces) or in an empty
+    /// log. Each weighs as much as a surface ray, but together at least as much as all surface rays, which keep what
+    /// `rays` do not visit from being forgotten. With half of the weight for surface rays, shadow rays test up to 4 %
+    /// more nodes (sibenik) when 64 thousand rays were learned from, up to 12 % (bathroom) when it was 16 thousand.
+    /// With a tenth or a fiftieth the count is the same to 2 %.
     pub fn weight_for(&self, rays: &[Ray]) -> f32 {
         self.weight().max(rays.len() as f32)
     }
@@ -269,7 +269,7 @@ impl TreeLog {
         self.weights.len()
     }
 
-    /// As how many rays they count.
+    /// Number of rays that the log counts as: the sum of their weights.
     pub fn weight(&self) -> f32 {
         self.weights.iter().sum()
     }
@@ -292,7 +292,7 @@ impl TreeLog {
         &self.prim_hits
     }
 
-    /// `N` and `L` of every node.
+    /// `N` and `L` of every node: weights of the rays that hit its box, and of the rays that hit a primitive below.
     pub(crate) fn counts(&self, tree: &BinaryTree) -> NodeCounts {
         let ends = subtree_ends(tree);
         let (entered, hits) = parallel::join(

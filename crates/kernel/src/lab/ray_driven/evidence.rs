@@ -16,10 +16,10 @@ use crate::ray::Ray;
 use crate::trace::binary::{Exhaustive, LeafHits, Witness};
 use crate::tree::binary::BinaryTree;
 
-/// Most rays that are used; of more, every second, third, ...
+/// At most this many rays are used. Of more rays, every second, third, ... is used.
 const MOST_RAYS: usize = 1 << 14;
 
-/// No more rays than this are kept for an object: instances multiply them.
+/// At most this many rays are kept for an object: instances multiply them.
 const MOST_RAYS_IN_OBJECT: usize = 1 << 15;
 
 /// Rays that one task follows.
@@ -35,7 +35,7 @@ pub(crate) struct Evidence {
 
 /// Rays on both levels, and their hits.
 pub(crate) struct AllEvidence {
-    /// Primitives that lie in the world itself.
+    /// Rays and hits of primitives in the world itself.
     pub world: Evidence,
     pub objects: Vec<Evidence>,
 }

@@ -18,7 +18,7 @@ const ROUNDS: usize = 2;
 /// `docs/notes/kernel.md`.
 pub(crate) const STOPPED: f64 = 0.05;
 
-/// Goes through the nodes, children first, and knows what those below cost.
+/// Goes through the nodes, children first, with the costs of the nodes below known.
 pub(crate) struct Learner<'a, const N: usize> {
     pub bvh: &'a WideTree<N>,
     pub model: &'a CostModel,
@@ -29,7 +29,7 @@ pub(crate) struct Learner<'a, const N: usize> {
     firsts: Vec<usize>,
     /// Cost of each visit, once its node is sorted.
     pub costs: Vec<f64>,
-    /// Whether the ray comes so far.
+    /// Whether the ray comes to the node of each visit.
     pub arrives: Vec<bool>,
     pub passages: Vec<Passage<N>>,
 }

@@ -14,7 +14,7 @@ pub(crate) struct Passage<const N: usize> {
     pub occluding: u16,
     /// Octant of its direction.
     pub octant: u8,
-    /// How much it counts.
+    /// Weight of the ray in the costs of the node.
     pub weight: f64,
     /// Cost of entering each child; 0 for those whose boxes it misses.
     pub costs: [f64; N],
