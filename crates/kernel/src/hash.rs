@@ -6,8 +6,8 @@ use crate::ray::Ray;
 /// Growth of a state from one number to the next: 2⁶⁴ over the golden ratio, made odd.
 pub(crate) const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// A mix of the bits of `z`, each of which changes every bit of the result: the output function of SplitMix64 (Steele, Lea and Flood
-/// 2014).
+/// A mix of the bits of `z`, each of which changes every bit of the result: the output function of SplitMix64 (Steele,
+/// Lea and Flood 2014).
 #[inline(always)]
 pub(crate) fn mixed(z: u64) -> u64 {
     let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -140,7 +140,7 @@ impl<'a> Column<'a> {
         }
     }
 
-    /// Fails unless there are so many items of so many numbers.
+    /// Fails unless there are this many items of this many numbers.
     fn check(&self, what: &'static str, items: usize, numbers: usize) -> Result<(), Error> {
         let Some(last) = items.checked_sub(1) else {
             return Ok(());

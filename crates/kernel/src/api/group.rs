@@ -41,8 +41,8 @@ pub struct Directions {
 }
 
 impl Directions {
-    /// Makes directions of any length ready: `[n, 3]`. A direction without a ray has the bit 0 in all rows: zero, not finite, or
-    /// so short (below 3e-39) that the reciprocal of its longest component is infinite.
+    /// Makes directions of any length ready: `[n, 3]`. A direction without a ray has the bit 0 in all rows: zero, not
+    /// finite, or so short (below 3e-39) that the reciprocal of its longest component is infinite.
     ///
     /// # Panics
     /// If there are more than 2³² directions.

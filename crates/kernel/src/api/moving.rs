@@ -31,8 +31,9 @@ use crate::tree::motion::Keys;
 
 /// A tree over a scene that moves, in which every ray has a time.
 ///
-/// Times go from 0, the first key, to 1, the last one. Times outside are clamped, and NaN counts as 0. An answer at a time equals
-/// the answer of [`Brute`](crate::Brute) over [`MovingScene::at`] that time, for every recipe, width and level, for single rays and in batches.
+/// Times go from 0, the first key, to 1, the last one. Times outside are clamped, and NaN counts as 0. An answer at a
+/// time equals the answer of [`Brute`](crate::Brute) over [`MovingScene::at`] that time, for every recipe, width and
+/// level, for single rays and in batches.
 ///
 /// Each span between two keys has a tree of its own, which is built and learned in the middle of the span. Boxes
 /// move along: a node tests where its boxes are at the time of the ray. Objects are stored once for every span.
@@ -97,8 +98,9 @@ impl MovingBvh {
     /// was built. `motion` belongs to the scene.
     ///
     /// # Errors
-    /// [`Error::OtherKeys`] if there are not as many trees as spans; [`Error::PrimitiveIsGone`] if a triangle of a moving mesh is not
-    /// where it is in the middle of the span, as in a tree of another scene or span. Other primitives are not compared.
+    /// [`Error::OtherKeys`] if there are not as many trees as spans; [`Error::PrimitiveIsGone`] if a triangle of a
+    /// moving mesh is not where it is in the middle of the span, as in a tree of another scene or span. Other
+    /// primitives are not compared.
     pub fn from_trees(motion: &Motion, trees: Vec<Bvh>) -> Result<Self, Error> {
         if trees.len() != motion.spans.len() {
             return Err(Error::OtherKeys {
@@ -322,12 +324,12 @@ pub struct Motion {
     spans: Vec<SpanKeys>,
 }
 
-/// What a scene is at both keys of a span.
+/// Meshes and instances that move, at both keys of a span.
 #[derive(Clone)]
 struct SpanKeys {
     /// By `geom_id`; `None` for geometry that does not move.
     meshes: Vec<Option<MeshSpan>>,
-    /// By `inst_id`.
+    /// By `inst_id`. `None` for an instance that does not move, or whose object is empty.
     placements: Vec<Option<MovingPlacement>>,
 }
 
@@ -342,7 +344,8 @@ impl Motion {
     /// What moves in a scene.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for an instance whose path leaves the range of `f32`; as [`Primitives::new`] for objects that move.
+    /// [`Error::OutOfRange`] for an instance whose path leaves the range of `f32`; as [`Primitives::new`] for objects
+    /// that move.
     pub fn new(scene: &MovingScene<'_>) -> Result<Self, Error> {
         let mut shapes: Vec<Option<ObjectShape>> = vec![None; scene.objects.len()];
         for instance in &scene.instances {

@@ -1,8 +1,9 @@
 //! Whether batches prefetch nodes and leaves. What pays depends on the tree, the rays and the caches of the machine, so
 //! it can be timed.
 //!
-//! The requests are a fifth of the instructions of a node step (AVX2), for nothing if the tree stays in the first cache. Trees of 30
-//! thousand to two million triangles are 1.03 to 1.43 times as fast with them (`docs/src/performance.md`).
+//! Prefetching is a fifth of the instructions of a node step (AVX2), and gains nothing if the tree stays in the first
+//! cache. Trees of 30 thousand to two million triangles are 1.03 to 1.43 times as fast with it
+//! (`docs/src/performance.md`).
 
 use alloc::vec::Vec;
 use core::time::Duration;

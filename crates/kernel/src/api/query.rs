@@ -91,7 +91,7 @@ impl Bvh {
         }
     }
 
-    /// Closest hits of many rays, in the way that is fastest for so many.
+    /// Closest hits of many rays, in a stream or ray by ray, whichever is faster for this number.
     pub(crate) fn intersect_many(
         &self,
         memory: &mut Memory,

@@ -57,7 +57,7 @@ const WORTHWHILE: usize = 1 << 17;
 /// Bytes of the smallest tree for which the rule sorts.
 const LARGE_TREE: usize = 16 << 20;
 
-/// Rays that the rule looks at: less than one of a hundred.
+/// Number of rays that the rule samples: less than one of a hundred.
 const SAMPLE: usize = 1 << 10;
 
 /// How many rays of a batch are sorted together, so that every thread has some.

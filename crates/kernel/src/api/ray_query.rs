@@ -256,7 +256,7 @@ impl<'a> RayQuery<'a> {
     /// | [`Visit::Reject`] | goes on, as if the primitive was not there |
     /// | [`Visit::Stop`] | the visit ends and returns `None` |
     ///
-    /// So the first hit that is accepted is the closest one that counts. Nothing behind the end of the visit is looked at.
+    /// So the first hit that is accepted is the closest one that counts. Nothing behind the end of the visit is tested.
     ///
     /// Hits come by ascending (t, inst_id, geom_id, prim_id), whatever the tree, and each primitive comes once for
     /// every instance of it. A sphere comes with the nearer of its two points inside the interval. Each triangle of a

@@ -152,8 +152,9 @@ impl Default for Recipe {
 }
 
 impl Recipe {
-    /// [`Preset::Fast`]: the shortest build, for trees that are soon built again. Children are in the order of their areas, unless
-    /// rays are given to learn from. Occlusion queries run at 0.80 to 0.89 of the rate of the default's (sponza and a city).
+    /// [`Preset::Fast`]: the shortest build, for trees that are soon built again. Children are in the order of their
+    /// areas, unless rays are given to learn from. Occlusion queries run at 0.80 to 0.89 of the rate of the default's
+    /// (sponza and a city).
     pub fn fast() -> Self {
         Self::default()
             .builder(Builder::BinnedSah)

@@ -109,7 +109,8 @@ impl Bvh {
     ///
     /// Files are not trusted. A wrong checksum is an error, and so is a file with a right one whose tree would let a query
     /// panic or run for ever, or has boxes that do not hold what is below them. Nothing checks that the geometry is the one
-    /// that you saved: [`Bvh::validate`] finds primitives that somebody put in twice. Memory grows with the bytes that are read.
+    /// that you saved: [`Bvh::validate`] finds primitives that somebody put in twice. Memory grows with the bytes that
+    /// are read.
     ///
     /// ```
     /// # use antumbra::{Bvh, Geometry, Ray, Recipe};

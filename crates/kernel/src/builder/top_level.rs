@@ -37,7 +37,7 @@ pub(crate) enum TopChild {
 }
 
 impl TopItem {
-    /// Follows a node that moved so many places back.
+    /// Moves the reference to a node back by `by` nodes.
     pub fn move_back(&mut self, by: usize) {
         if let TopChild::Subtree(child) = &mut self.child
             && let ChildKind::Inner(index) = child.kind()
@@ -77,7 +77,7 @@ impl<const N: usize> TopLevel<N> {
         top
     }
 
-    /// Nodes that so many items need at most.
+    /// Largest number of nodes that this many items need.
     pub fn most_nodes(items: usize) -> usize {
         // Every node but an empty or a lone root has two children or more.
         items.saturating_sub(1).max(1)

@@ -17,7 +17,7 @@ use crate::geometry::BLOCK;
 use crate::geometry::primitives::Primitives;
 use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 
-/// The world is taken apart into at least so many subtrees.
+/// The world is taken apart into at least this many subtrees.
 const MIN_SUBTREES: usize = 64;
 
 /// Puts the instances into a tree over the primitives of the world, which may be empty. There are instances.

@@ -2,8 +2,8 @@
 //!
 //! Source: the dynamic programme of Ylitie, Karras and Laine (2017), "Efficient Incoherent Ray Traversal on
 //! GPUs Through Compressed Wide BVHs", section 3.1. Theirs minimises the surface area heuristic; for rays that
-//! were seen, their weight takes the place of a node's area. Let `F(x, k)` be the least cost of what is below binary node `x` when `k` slots of its
-//! parent are given to it:
+//! were seen, their weight takes the place of a node's area. Let `F(x, k)` be the least cost of what is below binary
+//! node `x` when `k` slots of its parent are given to it:
 //!
 //! ```text
 //! D(x, k) = min over 0 < i < k of F(left, i) + F(right, k - i)
@@ -22,7 +22,7 @@ use crate::collapse::skeleton::{Children, Contraction, ForVisits};
 use crate::parallel::join;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 
-/// Subtrees of at most so many nodes are computed by one thread.
+/// Subtrees of at most this many nodes are computed by one thread.
 const SEQUENTIAL: usize = 2048;
 
 /// For each binary node `x` and number of slots `k`, how many of them its left child is best given, in
@@ -225,7 +225,7 @@ mod tests {
     use crate::tree::binary::{BinaryKind, BinaryNode};
     use antumbra_testkit::Rng;
 
-    /// A tree of so many leaves, of any shape.
+    /// A tree with this number of leaves, of any shape.
     fn random_tree(rng: &mut Rng, leaves: usize, tree: &mut BinaryTree) {
         let node = tree.nodes.len();
         let bounds = Aabb::EMPTY;

@@ -23,7 +23,7 @@ use crate::tree::wide::{PlacedTree, WideTree};
 const MIN_CHUNK: usize = 256;
 /// Pieces in which nodes or blocks are written, at most.
 const MAX_CHUNKS: usize = 64;
-/// Primitives are fetched from memory so many blocks before they are written.
+/// Primitives are fetched from memory this many blocks before they are written.
 const AHEAD: usize = 3;
 
 /// A tree over nothing: a root without children.
@@ -47,7 +47,7 @@ pub(crate) struct Part<'a, const N: usize> {
     pub primitives: &'a Primitives,
     pub tree: Cow<'a, BinaryTree>,
     pub skeleton: Skeleton<N>,
-    /// How often each place of [`BinaryTree::prims`] was hit, if anybody knows.
+    /// How often each place of [`BinaryTree::prims`] was hit, if that is known.
     pub prim_hits: Option<Cow<'a, [f32]>>,
 }
 
@@ -249,7 +249,7 @@ impl<'a, const N: usize> Plan<'a, N> {
     }
 }
 
-/// How many nodes or blocks of so many are written at one go.
+/// How many of `count` nodes or blocks are written at one go.
 fn chunk(count: usize) -> usize {
     count.div_ceil(MAX_CHUNKS).max(MIN_CHUNK)
 }

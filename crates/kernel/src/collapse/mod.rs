@@ -313,13 +313,13 @@ impl<'a> Rays<'a> {
 
 /// Rays that visit nodes by their area.
 struct AreaPrior {
-    /// Of the root.
+    /// Area of the root.
     area: f32,
     rays: f32,
 }
 
 impl AreaPrior {
-    /// For a log of so many rays.
+    /// Prior for a log of this many rays. An empty log counts as one ray.
     fn new(tree: &BinaryTree, rays: f32) -> Self {
         Self {
             area: tree.nodes[0].bounds.half_area(),

@@ -12,7 +12,7 @@ use crate::parallel;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 use crate::tree::costs::CostModel;
 
-/// Subtrees of at most so many binary nodes are the work of one thread.
+/// Subtrees of at most this many binary nodes are the work of one thread.
 const SEQUENTIAL: usize = 2048;
 
 /// Decides which binary nodes become the children of one wide node.

@@ -99,7 +99,7 @@ impl ByRay {
         }
     }
 
-    /// Rule `number`, 1 to 4, as [`ByRay::write`] wrote it, for a tree of so many nodes.
+    /// Rule `number`, 1 to 4, as [`ByRay::write`] wrote it, for a tree of this many nodes.
     pub fn read(
         words: &mut Words<'_>,
         number: u32,
@@ -152,7 +152,7 @@ pub(crate) struct DirectedOrder {
 }
 
 impl DirectedOrder {
-    /// Memory for two or eight orders of so many nodes.
+    /// Memory for two or eight orders of this many nodes.
     pub fn with_capacity(orders: usize, nodes: usize, width: usize) -> Self {
         Self {
             orders,

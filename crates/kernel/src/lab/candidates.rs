@@ -1,4 +1,5 @@
-//! All object splits, for builders that compare them with others or count rays for each: along each axis, between any two of a few items or between bins of many.
+//! All object splits, for builders that compare them with others or count rays for each: along each axis, between any
+//! two of a few items or between bins of many.
 
 use alloc::vec;
 use alloc::vec::Vec;

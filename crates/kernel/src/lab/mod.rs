@@ -2,8 +2,8 @@
 //!
 //! Only there with the feature `lab`. Users who want rays answered need none of this: what they use is compiled without
 //! it. The feature adds rows to the lists [`Builder`](crate::recipe::Builder), [`Collapse`](crate::recipe::Collapse) and
-//! [`Order`](crate::recipe::Order), the trait [`Laboratory`] with the steps of learning and with queries that count, and the logs
-//! as objects.
+//! [`Order`](crate::recipe::Order), the trait [`Laboratory`] with the steps of learning and with queries that count,
+//! and the logs as objects.
 //!
 //! ```
 //! use antumbra::lab::{Cost, Laboratory};

@@ -30,7 +30,7 @@ const SEQUENTIAL: usize = 4096;
 /// When a node becomes a leaf.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rule {
-    /// Nodes of at most so many primitives are halved until each has one.
+    /// Nodes of at most this many primitives are halved until each has one.
     halved: usize,
     /// Cost of visiting a node, where testing a primitive costs 1.
     visit: f32,

@@ -57,8 +57,8 @@ impl Log {
         words::write(Kind::Log, out, |sink| self.write_words(sink))
     }
 
-    /// Reads a log that [`Log::write`] wrote. Files are not trusted, as in [`Bvh::read`](crate::Bvh::read): counters that no ray could have
-    /// left make an order that saves nothing, and no answer wrong.
+    /// Reads a log that [`Log::write`] wrote. Files are not trusted, as in [`Bvh::read`](crate::Bvh::read): counters
+    /// that no ray could have left make an order that saves nothing, and no answer wrong.
     ///
     /// # Errors
     /// [`Error::Unreadable`] with what is wrong, [`Error::Io`] if reading fails.
@@ -217,7 +217,7 @@ impl Log {
     }
 }
 
-/// So many counters.
+/// Reads this many counters.
 fn read_counters(words: &mut Words<'_>, expected: usize) -> Result<Vec<u32>, Error> {
     let found = words.count()?;
     if found != expected {

@@ -5,9 +5,9 @@ use alloc::vec::Vec;
 
 /// Ascending lists of nodes, some of them marked; to be read one after the other.
 ///
-/// For each node there is a number of 16 bits: how many nodes were skipped since the one before it in the list, with the mark in
-/// the lowest bit. Depth-first order keeps steps short; a node that is too far away is [`FAR`] and its 32 bits. (Numbers of as
-/// many bytes as each needs, 1.2 to 1.4, take twice as long to read.)
+/// For each node there is a number of 16 bits: how many nodes were skipped since the one before it in the list, with
+/// the mark in the lowest bit. Depth-first order keeps steps short; a node that is too far away is [`FAR`] and its 32
+/// bits. (Numbers of as many bytes as each needs, 1.2 to 1.4, take twice as long to read.)
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct NodeLists {
     numbers: Vec<u16>,

@@ -38,7 +38,8 @@ const BYTES_PER_ITEM: [usize; 2] = [16, 12];
 
 /// Training log of a binary tree: the nodes that sample rays entered and the primitives that they hit.
 ///
-/// A few thousand rays are plenty; each takes a hundred bytes or so until the log is dropped, in a forest of instances seven hundred.
+/// A few thousand rays are plenty. Each takes a hundred bytes or so until the log is dropped, seven hundred in a forest
+/// of instances.
 /// Rays through thousands of coincident primitives would take a thousand times as much. Fewer of them are kept then: see
 /// [`TreeLog::add`].
 ///
@@ -190,7 +191,8 @@ impl TreeLog {
     /// left out.
     ///
     /// A call takes at most 32 MiB and 12 bytes per node, primitive and instance of all trees. The whole log takes at most
-    /// 48 MiB and 16 bytes. Every task gets an equal part of what a call may take. The first ray that does not fit ends its task, and the rays that are kept share the weight.
+    /// 48 MiB and 16 bytes. Every task gets an equal part of what a call may take. The first ray that does not fit ends
+    /// its task, and the rays that are kept share the weight.
     ///
     /// Uses the rayon pool that is current, if the `parallel` feature is on; the log does not depend on
     /// the number of threads.

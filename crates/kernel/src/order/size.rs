@@ -1,6 +1,6 @@
 //! Fewest primitives first. Embree's builder sorts children by descending primitive count and its
-//! occlusion query goes on with the highest lane hit, so the smallest subtree is visited first. An instance counts as one primitive, as
-//! it does there.
+//! occlusion query goes on with the highest lane hit, so the smallest subtree is visited first. An instance counts as
+//! one primitive, as it does there.
 
 use alloc::vec;
 

@@ -1,5 +1,5 @@
-//! The order that the book in `docs/` shows how to write. The order is no member of [`Order::ALL`](crate::order::Order::ALL); it is
-//! here so that the book is compiled and tested.
+//! The order that the book in `docs/` shows how to write. The order is no member of
+//! [`Order::ALL`](crate::order::Order::ALL); it is here so that the book is compiled and tested.
 
 use alloc::vec;
 use alloc::vec::Vec;

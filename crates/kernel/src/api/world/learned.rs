@@ -1,7 +1,7 @@
 //! What a world learned, and keeps when its instances move.
 //!
-//! Nodes of objects and of the ground keep their order by themselves. The top level is built again for every frame, so the world
-//! keeps the order of its items: their places among all items when the top level is traversed from its root.
+//! Nodes of objects and of the ground keep their order by themselves. The top level is built again for every frame, so
+//! the world keeps the order of its items: their places among all items when the top level is traversed from its root.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -31,8 +31,9 @@ impl World {
         order
     }
 
-    /// Puts children in the order that a copy of this world [learned](World::relearn). Children in objects and in the ground move
-    /// at once, in about a tenth of a millisecond. Children of the top level move when the instances are set next. Answers stay.
+    /// Puts children in the order that a copy of this world [learned](World::relearn). Children in objects and in the
+    /// ground move at once, in about a tenth of a millisecond. Children of the top level move when the instances are
+    /// set next. Answers stay.
     ///
     /// Both worlds may have changed since they were copied, as for [`Bvh::adopt`](crate::Bvh::adopt).
     pub fn adopt(&mut self, order: &ChildOrder) {

@@ -36,7 +36,8 @@ const MANY: usize = 32;
 /// Instances that one thread places at a time, at least.
 const CHUNK: usize = 256;
 
-/// A scene of objects placed by [`Instance`]s, which may move. [`World::fixed`] makes the tree of a scene in which nothing moves.
+/// A scene of objects placed by [`Instance`]s, which may move. [`World::fixed`] makes the tree of a scene in which
+/// nothing moves.
 ///
 /// Moving, adding and removing instances builds the top level from scratch, which is the nodes above the objects, and
 /// nothing else. So does [refitting](World::refit) objects, beside the objects themselves. Answers equal the answers of
@@ -226,7 +227,7 @@ impl World {
         self.bvh.set_masks(masks);
     }
 
-    /// [`Bvh::quality`] of an object: its expected cost now over that when it was built.
+    /// [`Bvh::quality`] of an object: its expected cost now over its expected cost when it was built.
     ///
     /// # Panics
     /// If there is no such object.
@@ -283,7 +284,7 @@ impl World {
         Ok(world)
     }
 
-    /// Adds the ground, for so many instances.
+    /// Adds the ground, for this number of instances.
     fn add_ground(&mut self, ground: &Object, instances: usize) -> Result<(), Error> {
         self.join(ground, None)?;
         // No object after all: it lies in the world itself.

@@ -166,7 +166,7 @@ impl Part {
 /// Constants of the whole tree.
 struct Plan {
     isa: Isa,
-    /// Parts of at most so many primitives are the work of one thread.
+    /// Parts of at most this many primitives are the work of one thread.
     sequential: usize,
     /// Where the later kinds of primitives begin, see [`Planes::key`].
     kinds: [f32; PrimKind::COUNT - 1],

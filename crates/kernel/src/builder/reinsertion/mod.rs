@@ -94,7 +94,7 @@ struct Search<'a> {
     /// Nodes below which there may be better places, each with what is gained down there before the subtree
     /// gets a parent: what taking it out saves, less the growth of the nodes that it will be below.
     open: &'a mut Vec<(u32, f32)>,
-    /// Inner nodes that may still be looked at.
+    /// Inner nodes that the search may still visit.
     visits: usize,
 }
 

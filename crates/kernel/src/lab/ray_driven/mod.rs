@@ -300,7 +300,7 @@ impl<C: SplitCost> Plan<'_, C> {
     }
 }
 
-/// Growth of [`Measure::until_hit`] with the hit of a ray that has so many already.
+/// Growth of [`Measure::until_hit`] when a ray that has this many hits gets one more.
 fn share_gained(hits: usize) -> f64 {
     let share = |hits: usize| 1.0 / (1 + hits) as f64;
     match hits {
