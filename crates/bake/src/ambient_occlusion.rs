@@ -55,10 +55,10 @@ impl Default for AmbientOcclusion {
 /// length 0, have the value NaN. Without any surface all others have 1. Surfaces count on both sides.
 ///
 /// Rays begin an [origin offset](Aabb::origin_offset) above the point, towards its normal, and `distance` counts from there.
-/// The offset is that of the box around the scene and this point.
+/// The offset is computed from the box that encloses the scene and this point.
 ///
-/// A value depends on its point, its normal and the choices alone. It has the same bits for any number of threads, any recipe
-/// of the tree, and wherever the point stands in whatever part of a list. With `n` rays, the standard error is at most
+/// A value depends only on its point, its normal and the choices. Its bits are the same for any number of threads, any recipe
+/// of the tree, and any place of the point in a list or a part of one. With `n` rays, the standard error is at most
 /// `0.5 / sqrt(n)`, and mostly far lower, because directions are spread evenly.
 ///
 /// Work is shared among the threads of the current rayon pool.

@@ -9,7 +9,7 @@ pub struct Atlas {
     pub size: u32,
     /// Points on the mesh, `[n, 3]`.
     pub points: Vec<[f32; 3]>,
-    /// Normals there, mixed from those of the vertices, `[n, 3]`.
+    /// Normals at the points, interpolated from the vertex normals, `[n, 3]`.
     pub normals: Vec<[f32; 3]>,
     /// Number of triangles without texture coordinates, which are left out.
     pub left_out: u64,
@@ -24,7 +24,7 @@ const NONE: u32 = u32::MAX;
 
 impl Atlas {
     /// Points in the middle of the texels that triangles cover. Row 0 has the coordinates v from 1 down: v runs upwards, as in
-    /// .obj and .ply files and after reading in those of glTF. The first triangle that covers a texel has it.
+    /// .obj and .ply files, and as in glTF files once they are read. The first triangle that covers a texel has it.
     ///
     /// # Errors
     /// [`Error::NoTextureCoordinates`] if no triangle has texture coordinates, [`Error::NoTexels`] if no texel is covered.

@@ -186,7 +186,7 @@ impl BitMatrix {
         Ok(rows.map(sum).collect())
     }
 
-    /// Puts the rows of another matrix below those of this one.
+    /// Appends the rows of another matrix below the rows of this one.
     ///
     /// # Errors
     /// [`Error::Length`] if the matrices differ in their columns, [`Error::TooLarge`] if there is no memory for both.

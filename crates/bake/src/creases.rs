@@ -23,7 +23,7 @@ pub struct Creased {
     pub copies: Vec<u32>,
 }
 
-/// Splits vertices where triangles around them meet at more than `degrees`.
+/// Splits vertices where the normals of adjacent triangles differ by more than `degrees`.
 ///
 /// Triangles around a vertex form a group if they are connected by edges at the vertex without a crease. Groups whose mean
 /// normals, weighted by area, differ by no more than the angle are one group. So a single rough edge in a smooth surface

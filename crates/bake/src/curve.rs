@@ -1,4 +1,4 @@
-//! Points in an order in which neighbours are near each other: along a Morton curve. Rays of neighbouring points meet the same
+//! Points in an order in which neighbours are near each other: along a Morton curve. Rays of neighbouring points visit the same
 //! parts of the scene.
 
 use antumbra::Aabb;
@@ -105,7 +105,7 @@ impl OrderedPoints {
         })
     }
 
-    /// Moves rows of `width` values from the order of the curve to that of the list.
+    /// Moves rows of `width` values from the order of the curve to the order of the list.
     pub fn put_back<T>(&self, width: usize, values: &mut [T]) {
         let mut order = self.order.clone();
         for first in 0..order.len() {

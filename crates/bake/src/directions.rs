@@ -4,8 +4,8 @@
 //! a number of the point in question (Kollig and Keller 2002, "Efficient multidimensional sampling"). The second is the angle
 //! around the normal, which starts at another number of the point (Cranley and Patterson 1976). So sines and cosines are those
 //! of one table, and each power of two of samples has one in every interval of that many equal parts of either coordinate.
-//! The numbers are a hash of the point, its normal and the seed. So a point has the same directions in whatever list it
-//! stands, and vertices that are stored twice agree.
+//! The numbers are a hash of the point, its normal and the seed. So a point has the same directions in every list,
+//! and vertices that are stored twice agree.
 
 use std::f64::consts::TAU;
 
@@ -17,7 +17,7 @@ pub enum Weighting {
     /// By the cosine of the angle to the normal, as a matt surface is lit by an even sky. Low parts count little.
     #[default]
     Cosine,
-    /// By solid angle alone: all parts alike.
+    /// By solid angle only: all parts alike.
     Uniform,
 }
 

@@ -229,7 +229,7 @@ impl Day {
 }
 
 impl Record {
-    /// Reads the fields of a line, and tells whether its irradiance is there.
+    /// Reads the fields of a line, and returns whether it has irradiance.
     fn read(
         fields: &[&str],
         per_hour: u32,

@@ -14,7 +14,7 @@ pub enum Error {
         /// Length wanted.
         wanted: usize,
     },
-    /// No ray per point was asked for.
+    /// The number of rays per point is 0.
     #[error("samples: found 0, wanted at least 1")]
     NoSamples,
     /// The distance up to which surfaces occlude is not positive.
@@ -98,7 +98,7 @@ pub enum Error {
         /// Number of the chunk.
         chunk: usize,
     },
-    /// Answers are not as many as those of the job.
+    /// The number of answers differs from the number of items of the job.
     #[error("the chunks of an earlier run do not fit")]
     Answers,
     /// The [monitor](crate::Monitor) cancelled the work.

@@ -16,7 +16,7 @@ use crate::{Error, Monitor, Orientation, Weighting};
 /// | [`Cosine`](Weighting::Cosine) | light of an even sky on the surface, over that on open level ground | 1 | about 1/2 |
 /// | [`Uniform`](Weighting::Uniform) | part of the sky's solid angle that is seen | 1 | about 1/2 |
 ///
-/// Points, normals and what is seen are those of [`sees_directions`](crate::sees_directions): one ray goes to the centre of each
+/// Points, normals and visibility are as in [`sees_directions`](crate::sees_directions): one ray goes to the centre of each
 /// patch. Points in free space, with `normals` empty, weigh by the cosine to the vertical. A point or normal that is not finite,
 /// and a normal of length 0, have the value NaN.
 ///
@@ -63,7 +63,7 @@ impl SkyPatches {
     }
 
     /// Light in W/m² on a surface with this normal (of length 1, in terms of east, north and up) from the patches that it sees.
-    /// Radiances are those of [`perez_sky`](crate::perez_sky), or sums of them over time.
+    /// Radiances are values of [`perez_sky`](crate::perez_sky), or their sums over time.
     ///
     /// # Panics
     /// If there are fewer radiances than patches.
@@ -78,7 +78,7 @@ impl SkyPatches {
 /// Sum of the weights of the directions that each point sees, such as hours of direct sun: `[n]`.
 ///
 /// Give the direction to the sun in the middle of each step of time, and the length of the step as its weight. Points, normals
-/// and what is seen are those of [`sees_directions`](crate::sees_directions). Suns below the horizon count like others: leave
+/// and visibility are as in [`sees_directions`](crate::sees_directions). Suns below the horizon count like others: leave
 /// them out. Weights are added in the order of directions, in double precision. A point or normal that is not finite, and a
 /// normal of length 0, have the value NaN.
 ///

@@ -27,7 +27,7 @@ struct Part {
 ///
 /// # Errors
 /// [`io::ErrorKind::InvalidInput`] if the lists differ in length, if a position is not finite, if there is no triangle, or if the file
-/// would be larger than 4 GiB. Otherwise those of the writer.
+/// would be larger than 4 GiB. Otherwise errors of the writer.
 pub fn write_glb(mesh: &ShadedMesh<'_>, file: &mut dyn Write) -> io::Result<()> {
     let vertices = mesh.positions.len();
     check(mesh)?;

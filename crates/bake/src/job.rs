@@ -41,7 +41,7 @@ pub trait Job: Sync {
     /// Result of the answers of all items, which may come in pieces.
     ///
     /// # Errors
-    /// [`Error::Answers`] if the answers are not those of this job.
+    /// [`Error::Answers`] if the answers do not fit this job.
     fn finish(&self, answers: &[Vec<u8>]) -> Result<Self::Found, Error>;
 
     /// Some rays of the job: `count` at most, and `per_item` of each item. None if trees cannot learn from this job.

@@ -22,7 +22,7 @@
 //! | how open is the sky above points | [`ambient_occlusion`], [`bent_normals`] | `f32`, and a direction |
 //! | which patches of the sky does each point see | [`SkyDivision::patches`], [`sees_directions`] | [`BitMatrix`], points x patches |
 //! | how much of the sky does each point see | [`sky_view`] | `f32` |
-//! | where does the sun stand | [`sun_positions`], [`Orientation::direction`] | angles, a direction in the scene |
+//! | where is the sun | [`sun_positions`], [`Orientation::direction`] | angles, a direction in the scene |
 //! | which suns does each point see, and for how long | [`sees_directions`], [`sun_hours`] | [`BitMatrix`], points x suns; `f64` |
 //! | how much energy does each point receive from the sun and the sky | [`SunJob`], [`run`] | [`SunValues`] |
 //! | how much of the light of a surface arrives at others | [`view_factors`], [`ViewFactorJob`] | `f64`, surfaces x surfaces |
@@ -30,9 +30,9 @@
 //! | how high is the horizon in each azimuth | [`HorizonJob`], [`FieldHorizonJob`], [`run`] | `f32`, points x azimuths |
 //! | which points see each other | [`sees_points`], [`sees_each_other`] | [`BitMatrix`], points x points |
 //!
-//! All of them take slices of `[f32; 3]` in the coordinates of the tree, and a [`Monitor`], which hears of the progress and may
-//! cancel. Answers about a point depend on this point alone. So they have the same bits for any number of threads, any recipe of the
-//! tree, and for lists that are given in parts. Hours of direct sun on the longest day, in a scene whose z axis points up:
+//! All of them take slices of `[f32; 3]` in the coordinates of the tree, and a [`Monitor`], which receives the progress and may
+//! cancel. Answers about a point depend only on this point. So they have the same bits for any number of threads, any recipe of
+//! the tree, and for lists that are given in parts. Hours of direct sun on the longest day, in a scene whose z axis points up:
 //!
 //! ```
 //! # use antumbra::{Bvh, Geometry, Recipe};
@@ -77,7 +77,7 @@
 //! - `viewshed`: cells of a `height_field` that observers see;  `sweep`, `horizon`: edges of the field as an eye sees them
 //! - `horizon_angles`: how high surfaces reach in each azimuth, by rays;  `field_horizon`: the same of height fields, exactly
 //! - `visibility`: directions and points that points see;  `exposure`: sums of what they see
-//! - `sky`: the sky in patches;  `sun`: where the sun stands;  `moment`, `clock`: dates, times of day and time zones
+//! - `sky`: the sky in patches;  `sun`: where the sun is;  `moment`, `clock`: dates, times of day and time zones
 //! - `hourly`: values step by step;  `measures`: classes of sunlight, reflected light
 //! - `perez`: the light of the sky;  `epw`: weather files
 //! - `orientation`: where up and north are in a scene

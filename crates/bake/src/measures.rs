@@ -83,7 +83,7 @@ impl Sunlight {
 
     /// Irradiation that ground reflects to sensors in kWh/m²: `albedo · G · (1 - cos β) / 2`, with the irradiation `G` of open level
     /// ground and the tilt `β` of the sensor (Liu and Jordan 1963). The ground is open and reflects evenly: neither its shadows nor
-    /// what stands before the sensor count. Sensors without a direction have NaN, and those in free space are level.
+    /// obstacles before the sensor count. Sensors without a direction have NaN, and those in free space are level.
     pub fn reflected(&self, albedo: f64, normals: &[[f32; 3]], sensors: usize) -> Vec<f64> {
         let global = self.global_horizontal();
         let value = |row: usize| {

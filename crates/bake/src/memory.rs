@@ -1,4 +1,4 @@
-//! Lists as long as those of a caller: an error where there is no memory for them.
+//! Lists as long as the caller's lists: an error where there is no memory for them.
 
 use crate::Error;
 

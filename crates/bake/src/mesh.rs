@@ -2,7 +2,7 @@
 
 use crate::{CREASE_ANGLE, split_at_creases, vertex_normals};
 
-/// Vertices and triangles, such as those of all meshes of a scene.
+/// Vertices and triangles, for example of all meshes of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Vertices, `[n, 3]`.
@@ -45,7 +45,7 @@ impl Mesh {
     }
 
     /// Adds a mesh without normals, whose vertices are split at creases of more than [`CREASE_ANGLE`]: see
-    /// [`split_at_creases`]. Copies of vertices come last. `uvs` and `is_turned` are those of [`Mesh::push`].
+    /// [`split_at_creases`]. Copies of vertices come last. `uvs` and `is_turned` are as in [`Mesh::push`].
     ///
     /// Returns the number of copies.
     pub fn push_creased(

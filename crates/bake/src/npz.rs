@@ -27,7 +27,7 @@ pub enum Array<'a> {
     Text(&'a str),
 }
 
-/// Whether points are those of the world as they are.
+/// Whether points are in world coordinates, without an offset.
 fn is_zero(local: &LocalOrigin) -> bool {
     *local == LocalOrigin::default()
 }
@@ -174,7 +174,7 @@ pub fn npz_bytes(entries: &[Entry<'_>]) -> u64 {
 ///
 /// # Errors
 /// [`io::ErrorKind::InvalidInput`] if a shape does not have as many numbers as its array, or if a name is longer than 100
-/// bytes. Otherwise those of the writer.
+/// bytes. Otherwise errors of the writer.
 pub fn write_npz(entries: &[Entry<'_>], file: &mut dyn Write) -> io::Result<()> {
     let invalid = |reason: &'static str| io::Error::new(io::ErrorKind::InvalidInput, reason);
     let mut offset = 0;
@@ -213,7 +213,7 @@ pub fn write_npz(entries: &[Entry<'_>], file: &mut dyn Write) -> io::Result<()> 
     file.write_all(&end(entries.len() as u64, directory.len() as u64, offset))
 }
 
-/// A file of the archive. Sizes and places stand in the extra field of large archives (zip64), always.
+/// A file of the archive. Sizes and offsets are always in the extra field of large archives (zip64).
 struct Record {
     name: String,
     crc: u32,
@@ -221,7 +221,7 @@ struct Record {
     offset: u64,
 }
 
-/// Mark of numbers that stand in another place, of 64 bits.
+/// Mark of a number whose 64 bits are in another field.
 const ELSEWHERE: u32 = u32::MAX;
 /// Version of the format that has numbers of 64 bits: 4.5.
 const VERSION: u16 = 45;

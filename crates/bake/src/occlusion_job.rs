@@ -12,7 +12,7 @@ use crate::{
 
 /// Job of [`ambient_occlusion`], or of [`bent_normals`].
 ///
-/// Items are points along a curve, so that those of a chunk are near each other.
+/// Items are points along a curve, so that the items of a chunk are near each other.
 pub struct OcclusionJob {
     places: OrderedPoints,
     options: AmbientOcclusion,
@@ -29,7 +29,8 @@ pub struct Openness {
 }
 
 impl OcclusionJob {
-    /// The job of these points, `[n, 3]`, with a normal each. `bent_normals` asks for the mean directions of the open sky, too.
+    /// The job of these points, `[n, 3]`, with a normal each. With `bent_normals`, the job
+    /// also computes the mean directions of the open sky.
     ///
     /// # Errors
     /// All errors of [`ambient_occlusion`], and [`Error::NoMemory`].

@@ -12,9 +12,9 @@ use crate::{Error, SunPosition};
 /// What the sun and the sky shine at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Irradiance {
-    /// On a surface that faces the sun, from the sun alone, in W/m².
+    /// Irradiance of a surface that faces the sun, from the sun only, in W/m².
     pub direct_normal: f64,
-    /// On level ground, from the sky alone, in W/m².
+    /// Irradiance of level ground, from the sky only, in W/m².
     pub diffuse_horizontal: f64,
 }
 
@@ -90,7 +90,7 @@ const KAPPA: f64 = 1.041;
 /// Radiance of every patch of the sky in W/(m² sr), `[patches]`.
 ///
 /// `day` is the day of the year, from 1. Radiances are scaled so that an open level surface receives `diffuse_horizontal`. While
-/// the sun stands at or below the horizon the sky is even. The sun itself is not part of the sky.
+/// the sun is at or below the horizon, the sky is even. The sun itself is not part of the sky.
 ///
 /// # Errors
 /// [`Error::Range`] if an irradiance is negative or not finite, or if an angle is not finite.
@@ -144,7 +144,7 @@ pub fn perez_sky(
 struct Parameters([f64; 5]);
 
 impl Parameters {
-    /// `None` if the sun does not stand above the horizon.
+    /// `None` if the sun is not above the horizon.
     fn new(elevation: f64, day: u32, irradiance: &Irradiance) -> Option<Self> {
         if !(elevation > 0.0) {
             return None;

@@ -46,7 +46,7 @@ impl ShadedMesh<'_> {
     ///
     /// # Errors
     /// [`io::ErrorKind::InvalidInput`] if the lists differ in length, if `name` is no such word, or if there are more than 2³¹
-    /// vertices, which indices of PLY files cannot tell apart. Otherwise those of the writer.
+    /// vertices, which is beyond the indices of PLY files. Otherwise errors of the writer.
     pub fn write(&self, name: &str, file: &mut dyn Write) -> io::Result<()> {
         let vertices = self.positions.len();
         let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';

@@ -88,8 +88,8 @@ impl Sensors {
         }
     }
 
-    /// Sensors on the surfaces that are seen from above, in the middle of square cells. Normals are those of the surfaces,
-    /// turned upwards. The grid covers the bounds of the tree; `orientation` says where its rows run.
+    /// Sensors on the surfaces that are seen from above, in the middle of square cells. Normals are the surface normals, turned
+    /// upwards. The grid covers the bounds of the tree; `orientation` says where its rows run.
     ///
     /// # Errors
     /// [`Error::Range`] if the spacing is not above 0, [`Error::Cells`] if the grid has more than 100 million cells,

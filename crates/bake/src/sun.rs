@@ -1,4 +1,4 @@
-//! Where the sun stands.
+//! Position of the sun in the sky.
 
 use solar_positioning::time::JulianDate;
 use solar_positioning::{Location, RefractionCorrection, SolarPositions, delta_t};

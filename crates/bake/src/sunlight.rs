@@ -79,8 +79,8 @@ impl TimeStep {
 }
 
 impl Weather {
-    /// Steps of the records on clocks `zone` hours ahead of UTC: all, or those of a period. A period may run over the end of the
-    /// year. Its years do not count, because years of a typical year differ.
+    /// Steps of the records on clocks `zone` hours ahead of UTC: all steps, or the steps of a period. A period may run
+    /// over the end of the year. Its years do not count, because years of a typical year differ.
     pub fn steps(&self, zone: f64, period: Option<[Moment; 2]>) -> Vec<TimeStep> {
         let place = |moment: &Moment| (moment.month, moment.day, moment.seconds);
         let is_in = |moment: &Moment| match &period {
@@ -134,7 +134,7 @@ pub struct Sunlight {
 }
 
 impl Sunlight {
-    /// Sun and sky in the steps of time. `is_measured` tells whether the steps have irradiance.
+    /// Sun and sky in the steps of time. `is_measured` says whether the steps have irradiance.
     ///
     /// # Errors
     /// [`Error::Range`] if the place or a time is outside its range.
@@ -354,8 +354,8 @@ fn unscaled_unit(vector: [f64; 3]) -> Option<[f64; 3]> {
 
 /// Job of [`SunValues`]: which suns and patches of the sky sensors see.
 ///
-/// Points, normals and what is seen are those of [`sees_directions`]. Items are points along a curve, so that those of a chunk
-/// are near each other.
+/// Points, normals and visibility are as in [`sees_directions`]. Items are points along a curve, so that the items of a
+/// chunk are near each other.
 pub struct SunJob<'a> {
     /// Normals as they were given.
     facing: &'a [[f32; 3]],
@@ -376,7 +376,7 @@ pub struct SunFound {
 }
 
 impl<'a> SunJob<'a> {
-    /// The job of these sensors. `normals` are those of surfaces, or empty for points in free space.
+    /// The job of these sensors. `normals` are the normals of surfaces, or empty for points in free space.
     ///
     /// # Errors
     /// [`Error::Length`] if the lists differ in length, or [`Error::NoMemory`].

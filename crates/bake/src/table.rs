@@ -21,7 +21,7 @@ impl Sensors {
     /// Sensors of a table: columns x, y, z and perhaps nx, ny, nz, by the names in the first line or else in this order.
     /// Semicolons, tabs, commas or spaces separate columns: the first of these that the first line has. Quotation marks keep
     /// a separator in a field. Every line has as many columns as the first. Empty lines and those that begin with `#` are
-    /// left out. Points are those of the world; they are measured from `local` before they are rounded.
+    /// left out. Points are in world coordinates. They are measured from `local` before they are rounded.
     ///
     /// ```
     /// # use antumbra::LocalOrigin;

@@ -158,7 +158,7 @@ struct Emitter<'a> {
     bvh: &'a Bvh,
     triangles: &'a [[[f32; 3]; 3]],
     normals: Vec<Option<[f64; 3]>>,
-    /// Sums of areas up to each triangle, over that of all.
+    /// Sums of areas up to and including each triangle, over the total area: ascending to 1.
     ends: Vec<f64>,
 }
 

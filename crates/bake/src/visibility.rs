@@ -38,8 +38,9 @@ const MOST_POINTS: usize = 1 << 12;
 /// Surfaces count on both sides, up to `distance` in units of the scene (infinite for all surfaces). A point, normal or direction
 /// that is not finite sees nothing, and neither does one of length 0. Without any surface all others see everything.
 ///
-/// Points are traced along a curve. A row depends on its point and normal alone, and has the same bits for any number of threads, any recipe of the tree, and
-/// wherever the point stands in whatever part of a list: long lists may be asked in parts, on any machines.
+/// Points are traced along a curve. A row depends only on its point and normal. Its bits are the same for any number of
+/// threads, any recipe of the tree, and any place of the point in a list or a part of one. So long lists may be traced in
+/// parts, on any machines.
 ///
 /// Work is shared among the threads of the current rayon pool. `monitor` counts points.
 ///
@@ -156,7 +157,7 @@ impl<'a> DirectionRows<'a> {
     }
 
     /// Fills `values`, so many for each row, with what `finish` makes of the row and its bits, and puts them where the points
-    /// stand in the list.
+    /// are in the list.
     fn run<T: Send>(
         &self,
         monitor: &dyn Monitor,
@@ -325,10 +326,10 @@ fn send_between(from: End, to: End, send: impl FnOnce(Ray)) {
 
 /// Which points of `to` each point of `from` sees: row `i` is `from[i]`, column `j` is `to[j]`.
 ///
-/// Points are `[n, 3]` and `[m, 3]`. `margin` is that of [`SightLines`], which say what counts. A point that is not finite sees
+/// Points are `[n, 3]` and `[m, 3]`. `margin` is as in [`SightLines`], which say what counts. A point that is not finite sees
 /// nothing.
 ///
-/// A row depends on its own point and on `to` alone, as of [`sees_directions`].
+/// A row depends only on its own point and on `to`, as a row of [`sees_directions`] does.
 ///
 /// # Errors
 /// [`Error`] if the margin is negative or not finite, if there is no memory for the matrix, or if `monitor` cancels.
@@ -381,7 +382,7 @@ pub(crate) fn sees_points_within(
     task.matrix()
 }
 
-/// Which points of one list see each other: those of `rows` in rows, all in columns.
+/// Which points of one list see each other: the points of `rows` in rows, all points in columns.
 ///
 /// As [`sees_points`] from `points[rows]` to `points`, with two differences. A point does not see itself. Each line is traced once
 /// for both of its points, so the whole matrix is symmetric, and its parts agree.

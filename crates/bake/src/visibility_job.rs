@@ -43,7 +43,7 @@ impl<'a> Eyes<'a> {
 pub struct VisibilityJob<'a> {
     /// Eyes that have a row.
     pub rows: &'a Eyes<'a>,
-    /// Eyes that have a column; `None` if they are those of the rows, none of which sees itself.
+    /// Eyes that have a column; `None` if they are the eyes of the rows, none of which sees itself.
     pub columns: Option<&'a Eyes<'a>>,
     /// Length left out at both ends of lines of sight, as for [`SightLines`](crate::SightLines).
     pub margin: Option<f32>,

@@ -175,7 +175,7 @@ impl<'a, J: Job> Work<'a, J> {
         self.append(out)
     }
 
-    /// Writes the chunks that were done since the last time, to be put behind those of the file.
+    /// Writes the chunks that were done since the last time, to be appended to the chunks of the file.
     ///
     /// # Errors
     /// Errors of `out`.
