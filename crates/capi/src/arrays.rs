@@ -50,7 +50,7 @@ fn check_pointer<T>(pointer: *const T, name: &str) -> Outcome {
 /// A handle or structure of the caller.
 ///
 /// # Safety
-/// If the pointer is not null, it must be that of a `T` which nobody changes while the result is used.
+/// If the pointer is not null, it must point to a `T` which nobody changes while the result is used.
 pub unsafe fn shared<'a, T>(pointer: *const T, name: &str) -> Outcome<&'a T> {
     check_pointer(pointer, name)?;
     // SAFETY: not null and aligned; the rest is the caller's promise.
@@ -72,7 +72,7 @@ pub unsafe fn optional<'a, T>(pointer: *const T, name: &str) -> Outcome<Option<&
 /// A handle of the caller that changes.
 ///
 /// # Safety
-/// If the pointer is not null, it must be that of a `T` which nobody else uses while the result is used.
+/// If the pointer is not null, it must point to a `T` which nobody else uses while the result is used.
 pub unsafe fn exclusive<'a, T>(pointer: *mut T, name: &str) -> Outcome<&'a mut T> {
     check_pointer(pointer, name)?;
     // SAFETY: not null and aligned; the rest is the caller's promise.

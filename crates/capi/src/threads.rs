@@ -62,7 +62,7 @@ pub unsafe extern "C" fn antumbra_threads_free(threads: *mut Threads) {
 /// Where a call works.
 #[derive(Clone, Copy)]
 pub enum Place<'a> {
-    /// On the calling thread alone.
+    /// Only on the calling thread.
     Here,
     /// Among the threads of a pool.
     Pool(&'a ThreadPool),

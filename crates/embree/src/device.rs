@@ -111,7 +111,7 @@ impl Drop for Device {
     }
 }
 
-/// What a configuration asks for.
+/// Settings of a configuration string.
 #[derive(Debug, Default)]
 struct Settings {
     threads: usize,

@@ -7,7 +7,7 @@ use crate::failure::{Failure, Outcome};
 
 /// What a handle points to.
 pub trait Handle {
-    /// The device that hears of failures.
+    /// The device to which failures are reported.
     fn device(&self) -> Option<&Device>;
 }
 

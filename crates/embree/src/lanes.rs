@@ -447,7 +447,7 @@ macro_rules! streams {
     )*};
 }
 
-/// Numbers of a ray and of a hit: rays with hits are padded to 24 when they are alone, never in packets.
+/// Numbers of a ray and of a hit: single rays with hits are padded to 24, packets never.
 const HIT_FIELDS: usize = RAY_FIELDS + 9;
 
 streams! {

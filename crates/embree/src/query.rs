@@ -33,7 +33,7 @@ fn inside(ray: &RtcRay, t: f32) -> f32 {
 pub enum Way {
     /// Every hit counts.
     Plain,
-    /// Only hits count whose masks share a bit with that of the ray, and on curves by Embree's rule.
+    /// Only hits count whose masks share a bit with the mask of the ray, and on curves by Embree's rule.
     Masked,
     /// Functions of the client decide.
     Called,

@@ -1,7 +1,7 @@
 //! User geometry: functions of the client as shapes of the kernel.
 //!
 //! Functions of Embree see more of a query than the kernel hands on: mask, ID and time of the ray, context and arguments.
-//! Each thread keeps that of its query while it runs.
+//! Each thread keeps these data of its query while the query runs.
 
 use std::cell::{Cell, RefCell};
 use std::ffi::c_void;

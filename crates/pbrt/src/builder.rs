@@ -87,7 +87,7 @@ pub(crate) struct Builder<'o> {
     /// Meshes in files that are not read yet.
     pending_meshes: PendingMeshes,
     budget: Budget,
-    /// Whether directives are those of pbrt-v4.
+    /// Whether directives are of pbrt-v4, not of pbrt-v3.
     is_version4: bool,
     /// Time during which the shutter is open, of pbrt-v4.
     exposure: f32,
@@ -236,7 +236,7 @@ impl<'o> Builder<'o> {
         }
     }
 
-    /// Returns true if a directive may stand in the current section. Otherwise reports it.
+    /// Returns true if a directive is allowed in the current section. Otherwise reports it.
     fn check_phase(&self, at: Span, directive: &Directive, report: &mut Report) -> bool {
         use Directive as D;
         let wanted = match directive {

@@ -212,7 +212,7 @@ pub(crate) fn unquote(quoted: &[u8], span: Span, report: &mut Report) -> String 
     resolved
 }
 
-/// Bytes of a file that tell whether it is text.
+/// Number of first bytes of a file that decide whether it is text.
 const START: usize = 1024;
 
 /// Whether bytes are no text: an eighth of the first ones are not UTF-8 or control characters, and more than a few.

@@ -240,7 +240,7 @@ fn directive_name(word: &[u8]) -> Option<&'static str> {
     DIRECTIVES.binary_search(&word).ok().map(|i| DIRECTIVES[i])
 }
 
-/// Reports a token that stands in the place of a directive.
+/// Reports a token that is in the place of a directive.
 fn report_stray(lexer: &Lexer, token: Token, report: &mut Report) {
     if token.kind != TokenKind::Broken && report.is_counted_only() {
         return;

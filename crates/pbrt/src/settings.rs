@@ -102,7 +102,7 @@ pub(crate) const INTEGRATORS: &[&str] = &[
     "whitted",
 ];
 
-/// Parameters of integrators that are taken as `path` or `volpath`, which change noise and time alone.
+/// Parameters of integrators that are taken as `path` or `volpath`, which change only noise and time.
 const OF_OTHER_INTEGRATORS: &[(&str, &[ParamType])] = &[
     ("bootstrapsamples", &[ParamType::Integer]),
     ("chains", &[ParamType::Integer]),

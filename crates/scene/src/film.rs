@@ -15,7 +15,7 @@ pub struct Film {
     pub scale: f32,
     /// Largest luminance of a sample; brighter samples are scaled down to it. Infinite by default.
     pub max_sample_luminance: f32,
-    /// File name that the scene asks for; `None` leaves it to the program.
+    /// File name that the scene names; `None` leaves it to the program.
     pub file_name: Option<String>,
 }
 
@@ -33,7 +33,7 @@ impl Default for Film {
 }
 
 impl Film {
-    /// Largest number of pixels of a picture. Larger pictures alone would take several GiB.
+    /// Largest number of pixels of a picture. Larger pictures would take several GiB by themselves.
     pub const MAX_PIXELS: u64 = 1 << 28;
 
     /// Pixels inside the crop window, `[x0, x1, y0, y1]` with `x1` and `y1` exclusive.

@@ -82,7 +82,7 @@ impl std::error::Error for Error {}
 impl Scene {
     /// Scene with its instances flattened to shapes in world space.
     ///
-    /// Shapes are first those of [`Scene::shapes`], then those of every instance, in order. A scene without instances
+    /// Shapes are first the [`Scene::shapes`], then the shapes of every instance, in order. A scene without instances
     /// is borrowed unchanged.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use serde::Serialize;
 /// Scattering of a surface that is the same in every direction around its normal, after Jakob, d'Eon, Jakob and Marschner 2014
 /// ("A comprehensive framework for rendering layered materials").
 ///
-/// For every pair of cosines there is an even Fourier series in the azimuth between both directions. Its value is that of the
+/// For every pair of cosines there is an even Fourier series in the azimuth between both directions. Its value is the
 /// scattering function times the cosine of the incident direction.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FourierTable {
@@ -15,8 +15,8 @@ pub struct FourierTable {
     pub eta: f32,
     /// 1 for luminance, or 3: luminance, red and blue.
     pub channels: u32,
-    /// Cosines of the angle to the normal, ascending from -1 to 1. At least 2. A cosine may stand twice, as 0 does where the table
-    /// differs on both sides of it.
+    /// Cosines of the angle to the normal, ascending from -1 to 1. At least 2. A cosine may occur twice, as 0 does where the
+    /// table differs on both sides of it.
     #[serde(serialize_with = "crate::raw")]
     pub cosines: Vec<f32>,
     /// Integral over the incident cosine up to each of them of the first coefficient of luminance: `[n, n]`, a row for every

@@ -124,7 +124,7 @@ impl Scene {
         self.camera.end.is_some() || self.instances.iter().any(|one| one.end.is_some())
     }
 
-    /// Number of triangles in the world; triangles of an object count once per instance, those of area lights too.
+    /// Number of triangles in the world; triangles of an object count once per instance, and so do triangles of area lights.
     pub fn triangle_count(&self) -> usize {
         triangles(self.standing_shapes())
     }

@@ -103,7 +103,7 @@ pub enum Material {
         metallic: Param<f32>,
         /// Perceptual roughness, 0..=1. Its square is the microfacet alpha.
         roughness: Param<f32>,
-        /// Reflectance of the coat at normal incidence, as of an index of refraction. 0.04 is that of index 1.5.
+        /// Reflectance of the coat at normal incidence, as of an index of refraction. Index 1.5 has 0.04.
         coat: Param<Rgb>,
         /// Share of the base that is a thin transparent sheet, 0..=1. Light goes straight through.
         transmission: Param<f32>,
@@ -197,7 +197,7 @@ pub enum Material {
         /// Height above the surface in scene units.
         height: Param<f32>,
     },
-    /// Material with a normal map: shading normals are those of an image, relative to the surface.
+    /// Material with a normal map: shading normals are read from an image, relative to the surface.
     NormalMapped {
         /// Material, neither [`Self::Bumped`], [`Self::NormalMapped`] nor [`Self::None`].
         material: Arc<Material>,

@@ -27,7 +27,7 @@ pub struct Shape {
     ///
     /// As in pbrt-v3, geometric normals are flipped when exactly one of `reverse_orientation` and
     /// `transform_swaps_handedness` is true. For spheres, and for meshes with normals of their own,
-    /// `reverse_orientation` alone decides.
+    /// only `reverse_orientation` decides.
     pub transform_swaps_handedness: bool,
 }
 

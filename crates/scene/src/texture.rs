@@ -100,7 +100,7 @@ pub enum Texture<T> {
     },
     /// Square root of the value; 0 where the value is negative.
     Root(Param<f32>),
-    /// 1 with the value as its probability, and 0 elsewhere. The decision depends on the bits of the position alone.
+    /// 1 with the value as its probability, and 0 elsewhere. The decision depends only on the bits of the position.
     ///
     /// As an alpha mask, the texture makes a surface as transparent as 1 minus the value, for all rays alike.
     Dither(Param<f32>),
@@ -131,7 +131,7 @@ pub enum NoisePattern {
 pub struct Octaves {
     /// Most octaves. Those that a pixel cannot show are left out.
     pub count: u32,
-    /// Amplitude of an octave over that of the one below.
+    /// Amplitude of an octave over the amplitude of the octave below.
     pub roughness: f32,
 }
 

@@ -425,7 +425,7 @@ pub unsafe extern "C" fn rtcSetGeometryMask(geometry: *const Geometry, mask: u32
     }
 }
 
-/// Every quality has the same answers; that of the scene decides how trees are built.
+/// Checks the quality, which has no effect: the build quality of the scene decides how trees are built.
 ///
 /// # Safety
 /// A geometry of this library, or null.

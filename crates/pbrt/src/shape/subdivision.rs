@@ -12,7 +12,7 @@ use glam::DVec3;
 pub(super) struct Surface {
     pub positions: Vec<DVec3>,
     pub indices: Vec<[u32; 3]>,
-    /// Where vertices stand in their triangles.
+    /// Neighbours of each vertex, in order.
     rings: Vec<Ring>,
 }
 
