@@ -141,7 +141,7 @@ pub enum Error {
     /// The kernel could not order the tree.
     #[error("the tree cannot be ordered: {0}")]
     Order(#[source] antumbra::Error),
-    /// The threads asked for could not be started.
+    /// The requested threads could not be started.
     #[error("{threads} threads cannot be started: {source}")]
     Threads {
         /// Number of threads.

@@ -6,7 +6,7 @@ use antumbra_scene::Filter;
 
 /// Weight of a sample at `(dx, dy)` pixels from the centre of a pixel. 0 beyond the radius.
 ///
-/// The formulas are those of pbrt-v3, evaluated exactly (pbrt looks them up in a 16 x 16 table).
+/// Formulas are as in pbrt-v3, evaluated exactly (pbrt looks them up in a 16 x 16 table).
 pub fn weight(filter: &Filter, [dx, dy]: [f32; 2]) -> f32 {
     let [rx, ry] = radius(filter);
     if dx.abs() > rx || dy.abs() > ry {

@@ -71,7 +71,7 @@ impl Film {
         self.next + self.waiting.len()
     }
 
-    /// Whether sizes and tile numbers are those of a film of these tiles, or of a shard of them. A film from a
+    /// Whether sizes and tile numbers fit a film of these tiles, or of a shard of them. A film from a
     /// file may have others.
     pub fn fits(&self, tiles: &Tiles, shard: Shard) -> bool {
         let mut waiting = self.waiting.iter();
@@ -153,7 +153,7 @@ impl Film {
 
     /// Picture of `width` x `height` pixels.
     ///
-    /// A pixel without samples is black. Where the weights of the samples cancel, their sum stands undivided.
+    /// A pixel without samples is black. Where the weights of the samples cancel, the sum is not divided.
     /// Filters with negative lobes may have negative means, which become black before the film's scale. Only a
     /// negative scale makes negative pixels.
     ///
@@ -167,7 +167,7 @@ impl Film {
     }
 
     /// Standard error of every pixel and channel, estimated from the variance of its samples. `None` unless
-    /// asked for.
+    /// requested.
     ///
     /// Infinite where nothing is known: with fewer than two samples, or where the weights of the samples add up
     /// to 0. Samples count as independent, so the estimate is too large for a stratified sampler.

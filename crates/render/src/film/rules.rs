@@ -68,7 +68,7 @@ impl Rules {
         }
     }
 
-    /// Whether every sample weighs 1 and belongs to its own pixel alone.
+    /// Whether every sample weighs 1 and belongs only to its own pixel.
     pub(super) fn weigh_one(&self) -> bool {
         matches!(self.filter, Filter::Box { radius } if radius == [0.5; 2])
     }

@@ -97,8 +97,8 @@ impl PixelSums {
         weight.unwrap_or_else(|| f64::from(self.samples(index)))
     }
 
-    /// Mean of a pixel, times `scale`. Negative means become black before. Where the weights cancel, the sum stands
-    /// undivided.
+    /// Mean of a pixel, times `scale`. Negative means become black before. Where the weights cancel, the sum is
+    /// not divided.
     pub fn mean(&self, index: usize, scale: f64) -> [f32; 3] {
         let weight = self.weight(index);
         let mean = |sum: f64| if weight == 0.0 { sum } else { sum / weight };

@@ -31,12 +31,12 @@ impl TileFilm {
         }
     }
 
-    /// Whether the size is that of a tile by these rules. A film from a file may have another.
+    /// Whether the size fits a tile by these rules. A film from a file may have another.
     pub fn fits(&self, rules: &Rules, tile: Window) -> bool {
         self.sums.fits(rules.reached(tile), rules)
     }
 
-    /// Pixels of `part` so far, row by row, from the samples of this tile alone. `part` must lie inside of what the
+    /// Pixels of `part` so far, row by row, from the samples of this tile only. `part` must lie inside of what the
     /// tile reaches.
     pub fn pixels(&self, part: Window) -> Vec<[f32; 3]> {
         let scale = f64::from(self.rules.scale);

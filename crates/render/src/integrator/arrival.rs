@@ -129,7 +129,7 @@ impl Arrivals {
     }
 }
 
-/// Scattering at Lambert reflectors. Other lanes get directions alone.
+/// Scattering at Lambert reflectors. Other lanes get only directions.
 struct Evaluate<'a, P> {
     points: &'a P,
     lights: &'a LightSamples,

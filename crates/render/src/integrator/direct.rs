@@ -5,7 +5,7 @@
 //! tree of branches addresses its random values.
 //!
 //! At the end of a chain, shadow rays sample the lights. *Probes*, rays along samples of the BSDF, look for any
-//! light. The power heuristic combines the two. A probe is an occlusion query before the emitter that it would meet,
+//! light. The power heuristic combines the two. A probe is an occlusion query before the emitter that it would hit,
 //! see [`crate::light::EmitterTree`]. (pbrt sends one probe per light sample, each looking for one light. Fewer
 //! probes that look for all lights have the same mean, and leave the work to shadow rays.)
 //!
@@ -93,7 +93,7 @@ struct Probes {
     shadows: ShadowQueue,
 }
 
-/// Use of the light that a probe meets.
+/// Use of the light that a probe finds.
 #[derive(Clone, Copy, Debug)]
 struct Probe {
     sample: u32,

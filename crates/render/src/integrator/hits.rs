@@ -40,7 +40,7 @@ impl Hits {
         self.block = None;
     }
 
-    /// Surface that ray `index` of the traced `rays` has hit. Quick if asked in order.
+    /// Surface that ray `index` of the traced `rays` has hit. Quick if called with ascending indices.
     pub fn surface(&mut self, shapes: &Shapes, rays: &[Ray], index: usize) -> Option<Surface> {
         self.hits[index].as_ref()?;
         let block = index / BLOCK;

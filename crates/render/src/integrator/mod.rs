@@ -68,7 +68,7 @@ pub struct Batch {
     emitted: Vec<Vec3>,
     reflected: Vec<Vec3>,
     probed: Vec<Vec3>,
-    /// Cost of the shadow rays of every sample. Empty unless asked for.
+    /// Cost of the shadow rays of every sample. Empty unless requested.
     pub costs: Vec<SampleCost>,
 }
 

@@ -108,7 +108,7 @@ impl<'b> Tracer<'b> {
         }
     }
 
-    /// Lets integrators ask `stop` whether to end before a batch is complete. Once true, it must stay true.
+    /// Lets integrators call `stop`, which says whether to end before a batch is complete. Once true, it must stay true.
     pub fn until(mut self, stop: &'b dyn Fn() -> bool) -> Self {
         self.stop = Some(stop);
         self
@@ -116,7 +116,7 @@ impl<'b> Tracer<'b> {
 
     /// Whether to end. The batch under way is then incomplete, and must not be used.
     ///
-    /// Every loop whose length a scene decides has to ask.
+    /// Every loop whose length a scene decides has to call this.
     #[inline]
     pub fn is_stopped(&self) -> bool {
         self.stop.is_some_and(|stop| stop())

@@ -13,10 +13,10 @@ use crate::columns::{BLOCK, Column, Column3, Flags, Stage, is_zero, run, select}
 use crate::sampler::warp::{cosine_hemisphere, triangle, uniform_hemisphere};
 use crate::surface::{Frame, interpolate};
 
-/// Points that ask for light, and the light that may arrive at them.
+/// Points that want light, and the light that may arrive at them.
 #[derive(Clone, Debug, Default)]
 pub struct LightBlock {
-    /// Points that ask.
+    /// Points that want light.
     pub asked: Asked,
     /// Light that may arrive.
     pub found: LightSamples,
@@ -205,7 +205,7 @@ impl LightBlock {
         }
     }
 
-    /// Has a lane ask for a sample of an element of a light, see [`Self::sample_elements`].
+    /// Requests a sample of an element of a light for a lane, see [`Self::sample_elements`].
     #[inline]
     pub fn ask_element(&mut self, lane: usize, sample: &ElementSample) {
         self.chosen.light[lane] = sample.light as u32;
@@ -215,7 +215,7 @@ impl LightBlock {
         self.asked.wants[lane] = 1;
     }
 
-    /// Samples the elements that the first `count` lanes [ask](Self::ask_element) for, as [`Light::sample_element`] does.
+    /// Samples the elements that the first `count` lanes [want](Self::ask_element), as [`Light::sample_element`] does.
     /// Densities are multiplied by the numbers of samples.
     pub fn sample_elements(&mut self, isa: Isa, lights: &Lights, count: usize) {
         self.found.found = [0; BLOCK];

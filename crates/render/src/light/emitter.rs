@@ -240,7 +240,7 @@ impl Emitter {
         })
     }
 
-    /// Sample of one element alone.
+    /// Sample of one element only.
     pub fn sample_element(
         &self,
         at: &Receiver,

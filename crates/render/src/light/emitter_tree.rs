@@ -1,8 +1,8 @@
-//! A tree of the emitting shapes alone: the light that a ray would meet if nothing else was there.
+//! A tree of only the emitting shapes: the light that a ray would hit if nothing else was there.
 //!
 //! A ray that looks for light needs no closest hit among all surfaces. The emitter is found among few shapes, and
-//! then an occlusion query tells whether anything lies before the emitter. Most such rays find no emitter, and ask
-//! nothing of the scene under a dark sky.
+//! then an occlusion query finds whether anything lies before the emitter. Most such rays find no emitter, and need
+//! no query of the scene under a dark sky.
 
 use antumbra::recipe::Order;
 use antumbra::{Bvh, Geometry, Hit, INVALID_ID, Ray, Recipe};

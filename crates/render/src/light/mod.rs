@@ -6,7 +6,7 @@
 //! - `sky.rs`: uniform radiance from outside the scene
 //! - `environment.rs`: radiance from outside by an image, sampled by `distribution.rs` or `octahedron.rs`
 //! - `emitter.rs`, `sphere.rs`: emitting shapes
-//! - `emitter_tree.rs`: a tree of the emitting shapes alone
+//! - `emitter_tree.rs`: a tree of only the emitting shapes
 //! - `image.rs`: images as lights read them
 
 mod block;
@@ -202,7 +202,7 @@ impl Light {
         matches!(self, Self::Sky(_) | Self::Environment(_))
     }
 
-    /// Whether only light samples find the light, since no ray ever meets it.
+    /// Whether only light samples find the light, since no ray ever hits it.
     #[inline]
     pub fn is_delta(&self) -> bool {
         matches!(self, Self::Point(_) | Self::Distant { .. })
@@ -247,7 +247,7 @@ impl Light {
         }
     }
 
-    /// Sample of one element alone.
+    /// Sample of one element only.
     pub fn sample_element(
         &self,
         at: &Receiver,

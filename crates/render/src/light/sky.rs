@@ -1,7 +1,7 @@
 //! A sky of one colour.
 //!
-//! Half of the samples are cosine-weighted, half uniform, on the sides that count. Cosine alone would be optimal for
-//! a flat diffuse surface. But its weights are unbounded where the shading normal leans away from the geometric
+//! Half of the samples are cosine-weighted, half uniform, on the sides that count. Purely cosine-weighted samples
+//! would be optimal for a flat diffuse surface. But their weights are unbounded where the shading normal leans away from the geometric
 //! normal.
 
 use std::f32::consts::PI;

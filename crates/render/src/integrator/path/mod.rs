@@ -6,7 +6,7 @@
 //! pbrt traces two rays per vertex for the light that it samples there: a shadow ray to a sample of the light, and a
 //! ray along a sample of the BSDF. Here the second is the ray that continues the path, whose light is added with the
 //! weight of BSDF sampling. Every continuation is traced, even the last, so the expectation is the same with a third
-//! fewer rays. The last continuation needs only the light that it meets, which an occlusion query tells, see
+//! fewer rays. The last continuation needs only the light that it hits. An occlusion query finds it, see
 //! [`crate::light::EmitterTree`].
 //!
 //! # Surfaces without a material
@@ -96,7 +96,7 @@ struct State {
     origin: Origin,
 }
 
-/// Origin of a ray, which decides the weight of the light that it meets.
+/// Origin of a ray, which decides the weight of the light that it hits.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Origin {
     /// The camera or a delta lobe: no light sample could have found the light.

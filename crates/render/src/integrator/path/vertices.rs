@@ -185,7 +185,7 @@ impl Vertices {
         }
     }
 
-    /// Adds the emission that the paths meet, and takes the points where they scatter. Paths that go on behind a surface
+    /// Adds the emission that the paths hit, and takes the points where they scatter. Paths that go on behind a surface
     /// without a material go `through`.
     pub fn meet(
         &mut self,

@@ -1,8 +1,8 @@
 //! All lights of a scene, and the choice of one of them.
 //!
 //! - *Spatial* chooses a light in proportion to an estimate of its unoccluded irradiance at the point: strength over
-//!   squared distance, or strength alone for lights infinitely far away (`source.rs`). A tenth of the choice is
-//!   uniform, so that no light is neglected. More than [`MANY`] lights stand in a tree (`tree.rs`), where groups of
+//!   squared distance, or only strength for lights infinitely far away (`source.rs`). A tenth of the choice is
+//!   uniform, so that no light is neglected. More than [`MANY`] lights are in a tree (`tree.rs`), where groups of
 //!   distant lights are estimated together. pbrt-v3's strategy of that name averages over the cells of a grid.
 //! - *Uniform* and *power* choose alike at all points, as in pbrt-v3. Here a mesh is one light, there every triangle.
 
@@ -110,7 +110,7 @@ impl Lights {
     }
 
     /// Index, radiance and density of every light outside the scene, for a ray from `at` along `dir`. The density is
-    /// that of the light's samples.
+    /// the density of the light's samples.
     #[inline]
     pub fn escaped_from(
         &self,

@@ -1,6 +1,6 @@
 //! A choice among many lights that looks closely at near lights only.
 //!
-//! Lights stand in a binary tree, each half of a node's lights together in space. Nodes that look small from a point
+//! Lights are in a binary tree, each half of a node's lights together in space. Nodes that look small from a point
 //! count as one source, other nodes are opened (Barnes and Hut 1986, *A hierarchical O(N log N) force-calculation
 //! algorithm*; for lights: Walter et al. 2005, *Lightcuts*). One source of this cut is chosen by irradiance, and in
 //! the source a light by strength, since its lights are about equally far away.
@@ -159,7 +159,7 @@ fn is_usable(total: f32) -> bool {
     total > 0.0 && total.is_finite()
 }
 
-/// Adds the node of `lights`, which stand from place `first` on, and its descendants. May reorder `lights`.
+/// Adds the node of `lights`, which begin at place `first`, and its descendants. May reorder `lights`.
 fn grow(nodes: &mut Vec<Node>, lights: &mut [u32], first: u32, sources: &[Source]) {
     let index = nodes.len();
     let parts: Vec<Source> = lights.iter().map(|&l| sources[l as usize]).collect();

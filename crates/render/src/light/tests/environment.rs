@@ -34,7 +34,7 @@ fn skew() -> Mat3 {
         * Mat3::from_diagonal(Vec3::new(1.0, -1.0, 1.0))
 }
 
-/// Images of any size: the density is that of the samples (which fall into cells of the sphere as often as it
+/// Images of any size: the density agrees with the samples (which fall into cells of the sphere as often as it
 /// says), adds up to one, and is positive wherever there is light.
 #[test]
 fn environments_are_sampled_as_their_density_says() {

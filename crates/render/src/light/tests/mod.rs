@@ -295,7 +295,7 @@ fn image(width: u32, height: u32, value: impl Fn(u32, u32) -> [f32; 3]) -> Arc<I
     })
 }
 
-/// The emission of a texture is that of the parts it is made of, and samples have the density that hits are told.
+/// A texture emits as much as its parts together, and samples have the density that hits get.
 #[test]
 fn textured_emission_is_the_sum_of_its_parts() {
     // Twice as bright where u is below one half: one of the two halves of a square.
