@@ -32,7 +32,7 @@
 //! - `resume/`: files of unfinished or partial renderings: [`Snapshot`]
 //! - `render/`: one rendering from beginning to end: [`render()`]
 //!
-//! Beside them stand `error.rs`, `options.rs`, `color.rs` and `columns.rs`, which import from no folder.
+//! Beside them are `error.rs`, `options.rs`, `color.rs` and `columns.rs`, which import from no folder.
 #![forbid(unsafe_code)]
 
 mod clock;

@@ -71,7 +71,7 @@ impl LiveTiles {
         self.window
     }
 
-    /// Tiles that were published since the viewer last asked. Unchanged tiles are not copied, and nobody waits.
+    /// Tiles that were published since the viewer's last call. Unchanged tiles are not copied, and nobody waits.
     pub fn changed(&self, seen: &mut Seen) -> Vec<Arc<LiveTile>> {
         seen.versions.resize(self.slots.len(), 0);
         let mut changed = Vec::new();

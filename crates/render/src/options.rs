@@ -6,8 +6,8 @@ use antumbra::Recipe;
 
 /// Choices for one rendering.
 ///
-/// The scene, `spp`, `seed` and `texture_spp` alone decide the picture. All other choices decide how fast it is rendered and what is
-/// measured, and change no bit of it.
+/// Only the scene, `spp`, `seed` and `texture_spp` decide the picture. All other choices decide how fast it is rendered and
+/// what is measured, and change no bit of it.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Samples per pixel. `None` is the scene's own number.
@@ -22,8 +22,8 @@ pub struct Options {
     /// An order that learns is learned from training rays: a sample of the picture's own shadow rays. A collapse that
     /// [needs a log](antumbra::recipe::Collapse::needs_log) then learns from these and from surface rays. A builder that
     /// [needs rays](antumbra::recipe::Builder::needs_rays) is driven by them, and the pre-pass is traced in a tree of
-    /// [`Builder::BinnedSah`](antumbra::recipe::Builder::BinnedSah). If the order does not learn, surface rays alone are
-    /// learned from. Seed and clock are those of the rendering, whatever the recipe says.
+    /// [`Builder::BinnedSah`](antumbra::recipe::Builder::BinnedSah). If the order does not learn, only surface rays
+    /// are learned from. Seed and clock are of the rendering, whatever the recipe says.
     pub recipe: Recipe,
     /// Share of the samples in the pre-pass, in 0..=1. 0 learns nothing, 1 leaves no sample to profit.
     ///

@@ -162,7 +162,7 @@ impl Patch {
     }
 }
 
-/// Step from a surface point to the point where a ray meets the tangent plane.
+/// Step from a surface point to the point where a ray intersects the tangent plane.
 fn step(surface: &Surface, ray: &Ray) -> Vec3 {
     let (org, dir) = (Vec3::from(ray.org), Vec3::from(ray.dir));
     let distance = (surface.point - org).dot(surface.normal) / dir.dot(surface.normal);

@@ -80,7 +80,7 @@ impl Grid {
 
     /// First event of a ray, by delta tracking for the colour `hero`, which is drawn with the probabilities `share`.
     ///
-    /// Weights are those of the balance heuristic over the colours (Wilkie and others 2014; Miller, Georgiev and Jarosz
+    /// Weights follow the balance heuristic over the colours (Wilkie and others 2014; Miller, Georgiev and Jarosz
     /// 2019). With equal attenuation coefficients they are the albedo, or 1.
     pub fn event(
         &self,

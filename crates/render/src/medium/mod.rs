@@ -61,8 +61,8 @@ impl Medium {
 
     /// Draws the first event of a ray along the unit vector `dir` that ends at `end`, which may be infinite.
     ///
-    /// The distance is drawn for one of the colours, chosen in proportion to the `throughput` of the path. Weights are
-    /// those of the balance heuristic over the colours (Pharr, Jakob and Humphreys 2016, section 15.2.1).
+    /// The distance is drawn for one of the colours, chosen in proportion to the `throughput` of the path. Weights
+    /// follow the balance heuristic over the colours (Pharr, Jakob and Humphreys 2016, section 15.2.1).
     pub fn event(
         &self,
         org: Vec3,

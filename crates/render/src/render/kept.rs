@@ -88,7 +88,7 @@ pub struct Sight {
     pub normal: [f32; 3],
 }
 
-/// Training rays of the world's camera, traced in a tree. They are those of a rendering with the same options.
+/// Training rays of the world's camera, traced in a tree. A rendering with the same options has the same ones.
 ///
 /// # Errors
 /// As [`render`](super::render()).

@@ -14,10 +14,10 @@ use crate::sampler::{Method, Sampler};
 use crate::surface::{Frame, Surface};
 use crate::world::World;
 
-/// Means over the first surfaces that the samples of every pixel meet.
+/// Means over the first surfaces that the samples of every pixel hit.
 ///
 /// Lists have a value for every pixel of the window, row by row. Every sample counts alike, whatever the filter. Samples
-/// that meet nothing count as black for the albedo, and not at all for the other layers. Pixels without a surface are 0.
+/// that hit nothing count as black for the albedo, and not at all for the other layers. Pixels without a surface are 0.
 #[derive(Clone, Debug)]
 pub struct Layers {
     /// Pixels that are covered.

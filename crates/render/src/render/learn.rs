@@ -1,13 +1,13 @@
 //! The tree that shadow rays visit: its nodes and its child order.
 //!
-//! 1. *First tree.* A learned collapse learns from surface rays alone. The pre-pass is traced in this tree. Binned
-//!    SAH stands in for a builder that needs rays.
-//! 2. *Training rays.* The pre-pass yields a sample of its shadow rays. An order of a tree that is not made anew
+//! 1. *First tree.* A learned collapse learns only from surface rays. The pre-pass is traced in this tree. Binned
+//!    SAH replaces a builder that needs rays.
+//! 2. *Training rays.* The pre-pass yields a sample of its shadow rays. An order of a tree that is not made again
 //!    learns from all of them as they are traced, unless the order keeps more per ray than memory allows.
 //! 3. *Final tree.* A learned collapse, and a builder that needs rays, learn from surface rays and training rays.
 //!    Training rays count for half or more. Surface rays stand for the parts that the camera does not see.
 //! 4. *Child order.* The order learns from a log of the training rays in the final tree.
-//! 5. *Prefetch.* The training rays tell whether prefetching pays in the final tree.
+//! 5. *Prefetch.* A short timing of the training rays decides whether the final tree prefetches.
 
 use std::time::{Duration, Instant};
 
@@ -201,7 +201,7 @@ pub fn learn_order(
     Ok(LearningFigures::of(recipe, bvh, made_anew))
 }
 
-/// Makes the tree anew for `rays`, or for any rays if there are none; returns whether it did. Its child order is still to
+/// Makes the tree again for `rays`, or for any rays if there are none; returns whether it did. Its child order is still to
 /// be learned. The binary tree for these rays is taken from `kept` if it is there, and else kept.
 pub fn make_anew(
     job: &Job,

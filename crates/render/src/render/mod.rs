@@ -56,10 +56,10 @@ use stats::{Times, Traced};
 pub struct Rendering {
     /// The picture: linear RGB, cropped as the scene's film says.
     pub image: Image,
-    /// Standard error of every pixel, if asked for. Infinite where there are fewer than two samples.
+    /// Standard error of every pixel, if requested. Infinite where there are fewer than two samples.
     pub standard_error: Option<Image>,
     /// Mean node plus primitive tests per shadow ray of every pixel of the picture's window, row by row, if
-    /// asked for. 0 where there was no shadow ray. Samples of the pre-pass do not count.
+    /// requested. 0 where there was no shadow ray. Samples of the pre-pass do not count.
     pub cost_map: Option<Vec<f32>>,
     /// Figures: rays, tests, times.
     pub stats: Stats,
@@ -72,7 +72,7 @@ pub struct Task {
     pub shard: Shard,
     /// State of an earlier run of this part.
     pub resume: Option<Snapshot>,
-    /// Training rays, instead of a pre-pass. Absent, they are those of `resume`.
+    /// Training rays, instead of a pre-pass. `None` takes the training rays of `resume`.
     pub lesson: Option<Lesson>,
     /// Whether the state can be [extended](Snapshot::extend) later. Takes more memory with a filter wider than a pixel.
     ///
@@ -82,7 +82,7 @@ pub struct Task {
 
 /// Renders a picture of the world.
 ///
-/// The picture depends, bit for bit, on the scene, on `options.spp` and on `options.seed` alone.
+/// The picture depends, bit for bit, only on the scene and on `spp`, `texture_spp` and `seed` of the options.
 ///
 /// # Errors
 /// [`Error::Cancelled`], [`Error::NoSamples`], [`Error::LogShare`], [`Error::Threads`], or an error of the

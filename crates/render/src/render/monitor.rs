@@ -32,7 +32,7 @@ pub trait Monitor: Sync {
         let _ = (samples, rays);
     }
 
-    /// Whether to stop. Asked between batches, and between the steps of a build.
+    /// Whether to stop. Called between batches, and between the steps of a build.
     fn cancelled(&self) -> bool {
         false
     }
@@ -42,18 +42,18 @@ pub trait Monitor: Sync {
         let _ = lesson;
     }
 
-    /// Tiles to publish the picture in while it is traced. Tiles of another window than that of the world's film stay
-    /// as they are.
+    /// Tiles to publish the picture in while it is traced. Tiles of another window than the window of the world's film
+    /// stay as they are.
     fn tiles(&self) -> Option<&LiveTiles> {
         None
     }
 
-    /// Whether to call [`Monitor::keep`] now. Asked between batches while the picture is traced.
+    /// Whether to call [`Monitor::keep`] now. Called between batches while the picture is traced.
     fn wants_snapshot(&self) -> bool {
         false
     }
 
-    /// Hands over the state of the rendering: when asked for, and when the rendering is cancelled after its first
+    /// Hands over the state of the rendering: when wanted, and when the rendering is cancelled after its first
     /// batch. The calling thread waits until the method returns, other threads go on.
     fn keep(&self, snapshot: Snapshot) {
         let _ = snapshot;

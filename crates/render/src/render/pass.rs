@@ -132,7 +132,7 @@ impl<'a> Worker<'a> {
         Some(())
     }
 
-    /// Radiance of the tile's samples in the pre-pass, but for those of an earlier run, which the film has already:
+    /// Radiance of the tile's samples in the pre-pass, except samples of an earlier run, which the film has already:
     /// they lie among the first `done` samples of every pixel.
     fn radiance_left(&self, index: usize, window: Window, done: u32) -> slice::Iter<'a, Vec3> {
         let radiance: &[Vec3] = match &self.learned.prepass {

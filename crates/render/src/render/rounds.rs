@@ -59,7 +59,7 @@ pub struct Growth {
 /// Cancelled, it leaves its samples in `growth`, and goes on from there when it is called again with the same world and
 /// options, except for `threads` and `recipe`. The bits of the picture are the same.
 ///
-/// `tree` is asked before every round, and `after` is told after it. Nothing is learned here: `options.recipe`,
+/// `tree` is called before every round, and `after` is called after it. Nothing is learned here: `options.recipe`,
 /// `options.log_share` and `options.standard_error` are ignored. All samples of the picture are kept in memory, so that
 /// a tile takes 26 bytes per pixel or more.
 ///

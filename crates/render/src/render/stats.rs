@@ -24,7 +24,7 @@ pub struct Stats {
     pub sampler: &'static str,
     /// Closest-hit rays.
     pub closest_rays: u64,
-    /// Shadow rays: rays that ask only whether anything is in the way.
+    /// Shadow rays: occlusion queries, which find only whether anything is in the way.
     pub shadow_rays: u64,
     /// Shadow rays that are occluded.
     pub occluded_rays: u64,
@@ -52,7 +52,7 @@ pub struct Stats {
     /// and through the final one.
     pub log_seconds: f64,
     /// Time of ordering the tree and of trying whether to prefetch. With a learned collapse, also of collapsing it
-    /// anew.
+    /// again.
     pub sort_seconds: f64,
     /// Part of `sort_seconds` that plans and applies the order, on one thread.
     pub order_seconds: f64,
@@ -128,7 +128,7 @@ impl Stats {
 
 /// Wall-clock times of the phases of a rendering.
 pub(super) struct Times {
-    /// Building the tree, also anew.
+    /// Building the tree, including a rebuild from scratch for a builder that needs rays.
     pub build: Duration,
     /// Making pixels of the film's sums.
     pub developing: Duration,

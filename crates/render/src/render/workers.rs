@@ -17,7 +17,7 @@ pub struct Jobs<'m> {
 }
 
 impl<'m> Jobs<'m> {
-    /// Jobs whose progress `monitor` is told.
+    /// Jobs that report their progress to `monitor`.
     pub fn new(count: usize, phase: Phase, monitor: &'m dyn Monitor) -> Self {
         Self::after(0, count, phase, monitor)
     }
@@ -52,7 +52,7 @@ impl<'m> Jobs<'m> {
         self.monitor.progress(self.phase, done as u64, all as u64);
     }
 
-    /// Whether the monitor has asked to stop, now or earlier.
+    /// Whether the monitor has requested a stop, now or earlier.
     pub fn is_cancelled(&self) -> bool {
         if !self.stopped.load(Ordering::Relaxed) && self.monitor.cancelled() {
             self.stopped.store(true, Ordering::Relaxed);
@@ -63,7 +63,7 @@ impl<'m> Jobs<'m> {
     /// Runs `worker` on every thread of the current pool. Returns the result of each.
     ///
     /// # Errors
-    /// [`Error::Cancelled`] if a job is left undone because the monitor asked to stop.
+    /// [`Error::Cancelled`] if a job is left undone because the monitor requested a stop.
     pub fn run<R: Send>(&self, worker: impl Fn(&Self) -> R + Sync) -> Result<Vec<R>, Error> {
         let results = rayon::broadcast(|_| worker(self));
         // A wish to stop that comes after the last job is too late.
@@ -78,7 +78,7 @@ impl<'m> Jobs<'m> {
 mod tests {
     use super::*;
 
-    /// Asks to stop as soon as `enough` jobs are done.
+    /// Requests a stop as soon as `enough` jobs are done.
     struct Until {
         enough: u64,
         stop: AtomicBool,

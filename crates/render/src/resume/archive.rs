@@ -63,7 +63,7 @@ pub fn write(kind: Kind, contents: &impl Serialize, file: &mut dyn Write) -> io:
 struct Summed<'a> {
     file: &'a mut dyn Write,
     sum: Xxh3,
-    /// Why writing failed. The encoder tells only that it did.
+    /// Why writing failed. The encoder reports only that it did.
     failure: Option<io::Error>,
 }
 

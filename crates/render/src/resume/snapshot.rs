@@ -56,7 +56,7 @@ impl Snapshot {
     /// Makes of a finished picture the state of an unfinished one with more samples, which gets the bits that it has
     /// without this state.
     ///
-    /// A tile whose samples are no whole batches begins anew. Full tiles have batches of 16 samples per pixel, smaller
+    /// A tile whose samples are no whole batches begins from scratch. Full tiles have batches of 16 samples per pixel, smaller
     /// tiles at the edges more.
     ///
     /// # Errors
@@ -167,7 +167,7 @@ impl Snapshot {
         self.sums.film.image(self.resolution)
     }
 
-    /// Standard errors so far, if asked for.
+    /// Standard errors so far, if requested.
     ///
     /// # Errors
     /// As [`Self::image`].

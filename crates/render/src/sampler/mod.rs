@@ -29,15 +29,15 @@ use antumbra_scene::SamplerKind;
 pub use block::StreamBlock;
 pub use stratified::Grid;
 
-/// Generator of random values. [`Method::of`] tells the generator of a scene.
+/// Generator of random values. [`Method::of`] returns the generator of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
     /// Independent uniform values.
     Independent,
-    /// Jittered grids, shuffled anew for every pair of dimensions.
+    /// Jittered grids, shuffled independently for every pair of dimensions.
     Stratified(Grid),
-    /// The (0, 2)-sequence of the first two Sobol' dimensions, shuffled and Owen-scrambled anew for every pair of
-    /// dimensions by hashing (Burley 2020, *Practical Hash-based Owen Scrambling*).
+    /// The (0, 2)-sequence of the first two Sobol' dimensions, shuffled and Owen-scrambled independently for every pair
+    /// of dimensions by hashing (Burley 2020, *Practical Hash-based Owen Scrambling*).
     OwenSobol,
     /// Points of maximal distance on the film, randomly shifted. Other dimensions as [`Method::OwenSobol`].
     MaxMinDist {

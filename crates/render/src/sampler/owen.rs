@@ -25,8 +25,8 @@ pub fn single(index: u32, key: u64) -> f32 {
 
 /// Owen's nested uniform scramble of a 32-bit fraction: bit k is flipped depending on the bits above it.
 ///
-/// On reversed bits, any hash serves in which lower bits alone influence a bit (Laine and Karras 2011). The
-/// multipliers are those of Burley 2020.
+/// On reversed bits, any hash serves in which only lower bits influence a bit (Laine and Karras 2011). The
+/// multipliers are from Burley 2020.
 #[inline]
 pub fn scramble(bits: u32, seed: u32) -> u32 {
     let mut x = bits.reverse_bits();

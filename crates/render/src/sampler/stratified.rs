@@ -43,8 +43,8 @@ impl Grid {
 
     /// Point `part` of `parts` of sample `index`.
     ///
-    /// A grid has no room for parts. The parts of all samples form a Latin hypercube instead, stratified in either
-    /// coordinate alone.
+    /// A grid has no room for parts. The parts of all samples form a Latin hypercube instead, stratified in each
+    /// coordinate separately.
     #[inline]
     pub fn part(self, index: u32, part: u32, parts: u32, key: u64) -> [f32; 2] {
         let count = self.count();

@@ -120,7 +120,7 @@ fn sobol_is_stratified_in_its_first_pair() {
     }
 }
 
-/// Mean over pixels of the squared error of a pixel's estimate, over that of independent samples.
+/// Mean over pixels of the squared error of a pixel's estimate, over the same mean for independent samples.
 fn relative_error(method: Method, dimension: u32, value: impl Fn([f32; 2]) -> f32) -> f64 {
     let error = |method| {
         let sampler = Sampler::new(method, 12);
@@ -139,7 +139,7 @@ fn relative_error(method: Method, dimension: u32, value: impl Fn([f32; 2]) -> f3
     error(method) / error(Method::Independent)
 }
 
-/// The variance of a smooth function and of an edge is well below that of independent samples, in every
+/// The variance of a smooth function and of an edge is well below the variance of independent samples, in every
 /// pair: those with tables of their own and those beyond.
 #[test]
 fn stratification_lowers_the_error() {
@@ -209,7 +209,7 @@ fn pixels_dimensions_and_seeds_are_independent() {
     }
 }
 
-/// The address alone decides a value: in reverse order, all values are equal.
+/// Only the address decides a value: in reverse order, all values are equal.
 #[test]
 fn values_do_not_depend_on_the_order_in_which_they_are_asked() {
     for method in methods() {

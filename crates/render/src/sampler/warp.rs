@@ -109,7 +109,7 @@ mod tests {
         assert_eq!(disk([0.5, 0.5]), [0.0, 0.0]);
     }
 
-    /// The mean of z and z² tells each density from the others.
+    /// The means of z and z² distinguish each density from the others.
     #[test]
     fn warps_have_their_densities() {
         let count = 4096;

@@ -1,4 +1,4 @@
-//! Origin offset: how far rays start from their surface, so that rounding does not let them meet it again.
+//! Origin offset: how far rays start from their surface, so that rounding does not let them hit it again.
 //!
 //! # Closed bodies
 //!

@@ -304,7 +304,7 @@ impl Placement {
     }
 }
 
-/// Lower bound of the length of `linear * v` over that of `v`, by the discs of Gershgorin. Exact for rotations of
+/// Lower bound of the length of `linear * v` over the length of `v`, by the discs of Gershgorin. Exact for rotations of
 /// stretched axes. 0 for strong shears and singular matrices.
 fn least_scale(linear: &Mat3A) -> f32 {
     let gram = (linear.transpose() * *linear).to_cols_array_2d();

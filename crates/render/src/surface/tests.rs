@@ -142,7 +142,7 @@ fn check(body: &Body, center: Vec3, what: &str) {
     check_blocks(&shapes, &rays, &hits);
 }
 
-/// Fails unless the surfaces of blocks are those of single hits, bit for bit, on every instruction set.
+/// Fails unless the surfaces of blocks equal the surfaces of single hits, bit for bit, on every instruction set.
 #[track_caller]
 fn check_blocks(shapes: &Shapes, rays: &[Ray], hits: &[Option<Hit>]) {
     let mut block = SurfaceBlock::default();

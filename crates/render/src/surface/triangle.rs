@@ -72,8 +72,8 @@ pub fn interpolate([p0, p1, p2]: [Vec3; 3], [w0, w1, w2]: [f32; 3]) -> (Vec3, Ve
 /// `weights`, oriented as pbrt-v3 does.
 ///
 /// Without vertex normals both are `(p1 - p0) x (p2 - p0)`, flipped if exactly one of `reverse_orientation` and a
-/// mirroring transformation is in force. With vertex normals the shading normal is their interpolation, flipped by
-/// `reverse_orientation` alone. The geometric normal takes its side.
+/// mirroring transformation is in force. With vertex normals the shading normal is their interpolation, flipped only by
+/// `reverse_orientation`. The geometric normal takes its side.
 #[inline]
 pub fn triangle_normals(
     shape: &Shape,

@@ -32,7 +32,7 @@ struct LaidStencil {
     offset: Vec2,
     /// Equal for equal images with equal mappings.
     id: u32,
-    /// Whether the stencil tells what lies between texels. If not, the stencil only tells of areas.
+    /// Whether the stencil decides single points exactly, between texels too. If not, it decides only whole areas.
     is_exact: bool,
 }
 
@@ -191,7 +191,7 @@ enum Edge {
 }
 
 impl Edge {
-    /// Edge at `least` of a texture's values. `None` unless bytes tell the two sides apart beyond any rounding.
+    /// Edge at `least` of a texture's values. `None` unless bytes separate the two sides beyond any rounding.
     fn of(least: f32, texture: &ImageTexture) -> Option<Self> {
         let plain = texture.scale == 1.0 && !texture.gamma;
         let grey = matches!(texture.image.pixels, Pixels::Grey8(_));
@@ -202,7 +202,7 @@ impl Edge {
     }
 }
 
-/// Bits that tell where an image, bilinearly interpolated, is 0, or where it is below an [`Edge`].
+/// Bits that mark where an image, bilinearly interpolated, is 0, or where it is below an [`Edge`].
 #[derive(Debug)]
 pub struct Stencil {
     size: IVec2,

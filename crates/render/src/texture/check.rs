@@ -125,7 +125,7 @@ fn image(image: &Image) -> Result<(), Error> {
     Ok(())
 }
 
-/// Largest number of texels along a side, which single precision still tells apart.
+/// Largest number of texels along a side that single precision distinguishes.
 const MAX_SIDE: u32 = 1 << 24;
 
 #[cfg(test)]

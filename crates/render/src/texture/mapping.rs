@@ -84,7 +84,7 @@ impl Mapping {
 
 /// Coordinates by a mapping of positions. Steps are differences over the fraction `delta` of a step.
 ///
-/// Steps take the short way round where the `periodic` coordinate starts anew. (pbrt-v3 compares the scaled
+/// Steps take the short way round where the `periodic` coordinate starts again. (pbrt-v3 compares the scaled
 /// difference by mistake.)
 fn around(place: &Place, delta: f32, periodic: Vec2, map: impl Fn(Vec3) -> Vec2) -> Coordinates {
     let st = map(place.point);

@@ -9,7 +9,7 @@
 //! - `check.rs`: textures and materials that are refused
 //! - `cutouts.rs`, `alpha.rs`: alpha masks, which cut out parts of a surface
 //!
-//! Values equal those of pbrt-v3, except where a file tells a deviation.
+//! Values equal the values of pbrt-v3, except where a file names a deviation.
 
 mod alpha;
 mod check;
@@ -296,7 +296,7 @@ type Pyramids<T> = HashMap<(*const Image, Wrap, bool), Arc<Pyramid<T>>>;
 
 /// Lowers the textures of one scene.
 ///
-/// Images are told apart by their address, so the scene must outlive this value.
+/// Images are distinguished by their address, so the scene must outlive this value.
 #[derive(Debug, Default)]
 pub struct Textures {
     numbers: Pyramids<f32>,

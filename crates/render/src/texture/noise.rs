@@ -20,7 +20,7 @@ const PERMUTATION: [u8; 256] = [
     128, 195, 78, 66, 215, 61, 156, 180,
 ];
 
-/// Frequency of an octave over that of the octave below.
+/// Frequency of an octave over the frequency of the octave below.
 const STEP: f32 = 1.99;
 
 /// A point in the space of a texture, with its change from one sample of the picture to the next.
@@ -204,7 +204,7 @@ mod tests {
         assert!(sum.abs() / 1000.0 < 0.05, "{sum}");
     }
 
-    /// In a cell whose corners are known, by hand: the value half way along an edge is that of two gradients.
+    /// In a cell whose corners are known, by hand: the value half way along an edge depends on two gradients.
     #[test]
     fn noise_by_hand() {
         // Corner (0, 0, 0) has the hash P[P[P[0]]] = P[P[151]] = P[17] = 10 modulo 16: gradient (0, 1, -1).

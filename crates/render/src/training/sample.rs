@@ -194,7 +194,7 @@ mod tests {
         }
     }
 
-    /// A full sample is spread evenly over the rays: its mean is that of all.
+    /// A full sample is spread evenly over the rays: its mean is near the mean of all.
     #[test]
     fn samples_are_fair() {
         let rays = rays(8 * SIZE);

@@ -34,7 +34,7 @@ pub(crate) use geometry::{moving_instance, rows};
 /// A scene ready to be rendered: kernel geometry with a binary tree, lights, materials, camera.
 ///
 /// A world owns its data, but shares meshes with the scene. Rendering does not change it. A tree of another builder
-/// is built when a rendering first asks for it, and kept. Copies share everything but camera and film.
+/// is built when a rendering first needs it, and kept. Copies share everything but camera and film.
 #[derive(Clone, Debug)]
 pub struct World {
     contents: Arc<Contents>,
@@ -51,8 +51,8 @@ pub struct Contents {
     pub(crate) media: Vec<Medium>,
     pub(crate) lights: Lights,
     pub(crate) emitters: EmitterTree,
-    /// Whether an occlusion query tells which light the last ray of a path meets. False if closest hits and
-    /// occlusion differ: surfaces without a material, masks for shadows alone.
+    /// Whether an occlusion query decides which light the last ray of a path hits. False if closest hits and
+    /// occlusion differ: surfaces without a material, masks for shadows only.
     pub(crate) ends_by_occlusion: bool,
     pub(crate) sampler: antumbra_scene::Sampler,
     pub(crate) integrator: antumbra_scene::Integrator,

@@ -16,7 +16,7 @@ pub struct GlossyReflection {
 }
 
 impl GlossyReflection {
-    /// Facets whose reflectance is `scale` times that of an interface.
+    /// Facets whose reflectance is `scale` times the reflectance of an interface.
     pub fn new(scale: Vec3, facets: TrowbridgeReitz, fresnel: Fresnel) -> Self {
         Self {
             scale,
@@ -94,8 +94,8 @@ pub struct GlossyTransmission {
 }
 
 impl GlossyTransmission {
-    /// Facets whose transmittance is `scale` times that of an interface. `eta` is the index of refraction below the
-    /// normal over that above it.
+    /// Facets whose transmittance is `scale` times the transmittance of an interface. `eta` is the index of refraction
+    /// below the normal over the index above it.
     pub fn new(scale: Vec3, facets: TrowbridgeReitz, eta: f32) -> Self {
         Self { scale, facets, eta }
     }

@@ -100,7 +100,7 @@ impl Metallic {
         lobe
     }
 
-    /// The dielectric's coat alone, for light that goes straight on.
+    /// Only the coat of the dielectric, for light that goes straight on.
     pub fn coat(&self) -> Coat {
         Coat {
             f0: self.coat,
@@ -190,7 +190,7 @@ impl Metallic {
     }
 }
 
-/// Reflectance of light that meets facets of a metal more than once (Kulla and Conty 2017; Fdez-Agüera 2019).
+/// Reflectance of light that hits facets of a metal more than once (Kulla and Conty 2017; Fdez-Agüera 2019).
 fn several(color: Vec3, albedo: CoatAlbedo) -> Vec3 {
     let mean = color + (Vec3::ONE - color) * (1.0 / 21.0);
     let once = albedo.mean_white();

@@ -13,9 +13,9 @@
 //! - `specular.rs`: perfect mirrors and smooth dielectrics
 //! - `subsurface.rs`: bodies in which light wanders
 //!
-//! All values equal those of pbrt-v3, two habits included:
+//! All values equal the values of pbrt-v3, two habits included:
 //!
-//! - The *geometric* normal tells reflection from transmission, the shading normal gives the value. A reflection may
+//! - The *geometric* normal separates reflection from transmission, the shading normal gives the value. A reflection may
 //!   therefore dip below the shading horizon, where it has a value but is never sampled.
 //! - `plastic` evaluates the Fresnel term of its coat from inside, as `FresnelDielectric(1.5, 1)` does.
 
@@ -54,14 +54,14 @@ pub use subsurface::{Interface, Subsurface, albedo_of};
 /// How a point of a surface scatters light.
 ///
 /// Lobes are *spread* over directions, or *delta*: a single direction that no other technique finds. Most materials
-/// have one kind. The share of delta lobes tells how often to sample which kind.
+/// have one kind. The share of delta lobes decides how often to sample which kind.
 #[derive(Clone, Debug)]
 pub enum Bsdf {
     /// Absorbs everything.
     Black,
     /// Lambert or Oren-Nayar.
     Diffuse(Diffuse),
-    /// Microfacet reflection alone.
+    /// Only microfacet reflection.
     Glossy(GlossyReflection),
     /// A diffuse base and a microfacet coat, added.
     Plastic(Diffuse, GlossyReflection),
@@ -125,7 +125,7 @@ impl Bsdf {
         )
     }
 
-    /// Delta lobes alone.
+    /// Only delta lobes.
     pub fn specular(specular: Specular) -> Self {
         if specular.is_black() {
             Self::Black
@@ -234,7 +234,7 @@ impl Bsdf {
 
     /// Value and density for unit directions `wo` (towards the viewer) and `wi` (towards the light).
     ///
-    /// `reflects` tells whether both lie on the same side of the geometric surface. Delta lobes are 0.
+    /// `reflects` says whether both lie on the same side of the geometric surface. Delta lobes are 0.
     #[inline]
     pub fn evaluate(&self, wo: Vec3, wi: Vec3, reflects: bool) -> Evaluation {
         if wo.z == 0.0 {

@@ -21,7 +21,7 @@ fn bsdf(material: &Material) -> Bsdf {
 enum Holds {
     /// None: the material may reflect more than it receives, or compresses radiance.
     Nothing,
-    /// Value from one direction to the other is that of the way back, radiance freed of the indices.
+    /// Value from one direction to the other equals the value of the way back, radiance freed of the indices.
     Reciprocity,
     /// Reciprocity, and no more light leaves than arrives.
     Energy,
@@ -520,7 +520,7 @@ fn white_furnace() {
     }
 }
 
-/// Values and delta lobes of a mixture are those of its parts, scaled, in whatever way they are drawn.
+/// Values and delta lobes of a mixture are sums over its parts, scaled, in whatever way they are drawn.
 #[test]
 fn mixtures_are_sums() {
     let parts = [

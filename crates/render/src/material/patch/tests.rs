@@ -31,7 +31,7 @@ fn triangle(uvs: Vec<Vec2>, normals: Vec<Vec3>) -> TriangleMesh {
     }
 }
 
-/// Point where a ray meets the plane of a triangle.
+/// Point where a ray intersects the plane of a triangle.
 fn meet(mesh: &TriangleMesh, ray: &Ray) -> Hit {
     let [p0, p1, p2] = corners(mesh, 0);
     let (org, dir) = (Vec3::from(ray.org), Vec3::from(ray.dir));
