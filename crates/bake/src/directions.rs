@@ -176,7 +176,7 @@ mod tests {
                 let count = 1_u32 << log;
                 let samples = Samples::new(count / 2, weighting);
                 let directions = samples.around([0.0, 0.0, 1.0], key);
-                // Angles begin anywhere: the first sample tells where, in the middle of its interval.
+                // Angles begin anywhere: the first sample marks the start, from the middle of its interval.
                 let [x, y, _] = directions.get(0).map(f64::from);
                 let start = y.atan2(x) / TAU - 0.5 / f64::from(count);
                 for first in [0, log] {

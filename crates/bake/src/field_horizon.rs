@@ -241,7 +241,7 @@ impl Walk<'_> {
         let other = [cell[0] + to[0], cell[1] + to[1]];
         let (a, b) = (self.bent(cell), self.bent(other));
         if part == 0.0 {
-            // A vertex is where edges of all families meet, of which one is enough.
+            // A vertex belongs to edges of all families, of which one is enough.
             return a.filter(|_| self.job.field.has_triangle(cell));
         }
         let (a, b) = (a?, b?);

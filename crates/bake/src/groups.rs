@@ -193,7 +193,7 @@ impl Sensors {
         bvh.intersect_batch(&rays, &mut hits);
         let found = rays.iter().zip(hits).map(|(ray, hit)| {
             let hit = hit?;
-            // A ray that leaves by a gap of its own surface meets another one at a slant.
+            // A ray that leaves by a gap of its own surface hits another one at a slant.
             let normal = bvh.normal(ray, &hit)?;
             let slant: f32 = normal.iter().zip(ray.dir).map(|(a, b)| a * b).sum();
             let is_own = self.normals.is_empty()

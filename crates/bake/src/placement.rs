@@ -332,7 +332,7 @@ mod tests {
 
     #[test]
     fn each_square_has_one_sensor() {
-        // Areas over that of a square: 10 x 20, 60 x 60, 2 (10 + 20) x 6. Coordinates are no odd multiples of the spacing.
+        // Areas over the area of a square: 10 x 20, 60 x 60, 2 (10 + 20) x 6. Coordinates are no odd multiples of the spacing.
         for (kind, count) in [
             (Surface::Roof, 50),
             (Surface::Ground, 900),

@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn years_of_366_days_and_ends_of_years() {
-        // On the day of an equinox the sun stands over the equator: at noon there, it is at the zenith.
+        // On the day of an equinox the sun is over the equator: at noon there, it is at the zenith.
         let equator = Place::default();
         for noon in [
             "2024-03-20T12:07:00",

@@ -118,7 +118,7 @@ impl<'a> DirectionRows<'a> {
             return Err(Error::Distance(distance));
         }
         let mut all = memory::room("directions", directions.len())?;
-        // Lengths are those of the scene, not of the direction.
+        // Lengths are in units of the scene, not of the direction.
         let has_lengths = distance.is_finite() || normals.is_empty();
         all.extend(
             directions

@@ -17,7 +17,7 @@ pub unsafe trait Plain: Copy + Send + Sync + 'static {}
 macro_rules! plain {
     ($($Type:ty),* $(,)?) => {
         $(
-            // SAFETY: made of integers and floats alone.
+            // SAFETY: made only of integers and floats.
             unsafe impl Plain for $Type {}
         )*
     };

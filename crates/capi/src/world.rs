@@ -17,7 +17,7 @@ pub struct Placed {
     pub transform: [f32; 12],
 }
 
-// SAFETY: made of integers and floats alone.
+// SAFETY: made only of integers and floats.
 unsafe impl Plain for Placed {}
 
 /// A world with the masks of its parts, `antumbra_world`.

@@ -199,7 +199,7 @@ impl World {
             placements::placed(*object as u32, rows, own, parts.local.origin)
         });
         let instances = memory::collected(instances, rows.len(), "instances")?;
-        // Whoever has the world alone changes it in place.
+        // A sole owner changes the world in place.
         drop(data);
         Self::change(slf, threads, |world, parts| {
             world.set_instances(&instances)?;

@@ -40,7 +40,7 @@ impl FourierTable {
     pub fn check(&self) -> Result<(), String> {
         let count = self.cosines.len();
         let pairs = count.checked_mul(count);
-        // 0 may stand there twice, once for either side.
+        // 0 may occur twice, once for either side.
         let ascend = self.cosines.windows(2).all(|two| two[0] <= two[1])
             && self.cosines.windows(3).all(|three| three[0] < three[2])
             && self.cosines.first() < self.cosines.last();

@@ -37,7 +37,7 @@ impl PreviewFile {
             let mut seen = Seen::default();
             let mut last = Instant::now();
             loop {
-                // Asked before the picture, so that the last look comes after the last change.
+                // Read before the picture, so that the last look comes after the last change.
                 let end = stopped.load(Ordering::Acquire);
                 if end || last.elapsed() >= every {
                     if !tiles.changed(&mut seen).is_empty()

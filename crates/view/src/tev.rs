@@ -130,7 +130,7 @@ impl Sender {
         let mut viewer: Option<Viewer> = None;
         let mut tried: Option<Instant> = None;
         loop {
-            // Asked before the picture, so that the last look comes after the last change.
+            // Read before the picture, so that the last look comes after the last change.
             let last = self.end.has_come();
             let due = tried.is_none_or(|at| at.elapsed() >= AGAIN);
             if viewer.is_none() && (due || last) {

@@ -19,7 +19,7 @@ pub const WARNINGS: &[&str] = &[
     "-Wconversion",
 ];
 
-/// Warnings of programs: as those of headers, but for conversions.
+/// Warnings of programs: the warnings of headers, except for conversions.
 pub const PROGRAM_WARNINGS: &[&str] = &["-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wshadow"];
 
 #[derive(Clone, Copy, PartialEq)]

@@ -18,7 +18,7 @@ fn assert_complains(diagnostics: &[Diagnostic], line: u32, column: u32, words: &
 
 #[test]
 fn single_mistakes() {
-    // The mark stands before the place of the mistake.
+    // The mark is before the place of the mistake.
     #[rustfmt::skip]
     const CASES: &[(&str, &str)] = &[
         // Syntax.

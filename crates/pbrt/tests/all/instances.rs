@@ -49,7 +49,7 @@ fn instances_are_the_shapes_written_out_by_hand() {
     );
 }
 
-/// World transformation: that of the instance times that of the shape, including the one at ObjectBegin.
+/// World transformation: instance times shape, including the transformation at ObjectBegin.
 #[test]
 fn the_transformation_at_the_definition_comes_first() {
     assert_same(

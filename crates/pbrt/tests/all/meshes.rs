@@ -111,7 +111,7 @@ fn broken_meshes_are_reported_in_order_of_the_file() {
     text += "Material \"mate\"\nWorldEnd";
     let (_folder, result) = load_files(&[("s.pbrt", text.as_bytes()), ("3.ply", &ply(3))]);
     let lines: Vec<u32> = complaints(result).iter().map(|d| d.line).collect();
-    // All shapes except those of the valid mesh, and the material.
+    // All shapes except the shapes of the valid mesh, and the material.
     let expected: Vec<u32> = (2..33)
         .filter(|line| (line - 2) % 10 != 3 || *line == 32)
         .collect();

@@ -72,7 +72,7 @@ fn scenes_without_instances_load_whole() {
 
 #[test]
 fn scenes_with_instances_load_whole() {
-    // Triangles in memory and triangles in the world, both without those of lights, then objects and instances.
+    // Triangles in memory and triangles in the world, both without triangles of lights, then objects and instances.
     for (name, stored, standing, lights, objects, instances) in [
         ("scans", 589_654, 11_595_496, 8, 4, 77),
         ("ingolstadt", 182_737, 3_837_437, 2, 1, 21),

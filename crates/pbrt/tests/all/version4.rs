@@ -189,7 +189,7 @@ fn lights_have_the_luminance_of_their_scale() {
     assert!((*radiance - Rgb::splat(2.0)).abs().max_element() < 1e-5);
 }
 
-/// Even spectra of surfaces are grey, and colours of other spaces become those of the picture.
+/// Even spectra of surfaces are grey, and colours of other spaces are converted to the space of the picture.
 #[test]
 fn surfaces_are_seen_under_daylight() {
     let kd = |text: &str| match material4(text) {
@@ -408,14 +408,14 @@ fn the_version_is_said_in_one_sentence() {
         );
         assert!(mistakes.to_string().contains(word), "{mistakes}");
     }
-    // Scenes of version 3 with mistakes are not told to be of version 4.
+    // Scenes of version 3 with mistakes are not reported as of version 4.
     let Err(error) = load_text("WorldBegin\nMaterial \"mate\"\nWorldEnd") else {
         panic!("it should be refused");
     };
     assert!(!error.to_string().contains("pbrt-v4"), "{error}");
 }
 
-/// The length of a comment and the words of a string say nothing about the version, wherever they stand in the file.
+/// The length of a comment and the words of a string say nothing about the version, wherever they are in the file.
 #[test]
 fn comments_and_strings_do_not_make_version_4() {
     let settings = "PixelFilter \"gaussian\" \"float alpha\" 8\n";

@@ -200,7 +200,7 @@ impl Hits {
     /// The hits with points that are known already.
     pub fn with_points(self, py: Python<'_>, points: Vec<f64>) -> PyResult<Self> {
         let points = shaped(py, points, &self.arrays.shape_of_vectors(py))?;
-        // Nobody has asked for them yet.
+        // Nobody has read them yet.
         let _ = self.arrays.point.set(py, points.unbind());
         Ok(self)
     }

@@ -1,4 +1,4 @@
-//! The page's server, by raw requests: who may ask, what is sent, and what a wish does.
+//! The page's server, by raw requests: who may send requests, what is sent, and what a wish does.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -119,7 +119,7 @@ impl Viewer {
     }
 }
 
-/// A server that renders a town while `ask` asks it.
+/// A server that renders a town while `look` sends requests.
 fn with_server(spp: u32, look: impl FnOnce(u16, &str) + Send) {
     let server = Server::bind(0, "town").expect("a server");
     let (port, path) = parts(&server.address());
@@ -320,7 +320,7 @@ fn a_scene_that_cannot_be_shown_says_why() {
     server.fail("no lights");
     viewer.until(|status| status["phase"] == "failed");
     assert_eq!(viewer.status["text"], "no lights");
-    // The end may be told once more before the stream ends.
+    // The end may be reported once more before the stream ends.
     while viewer.next().is_some() {
         assert_eq!(viewer.status["phase"], "failed");
     }
