@@ -1,8 +1,8 @@
 //! A sky of one colour.
 //!
 //! Half of the samples are cosine-weighted, half uniform, on the sides that count. Purely cosine-weighted samples
-//! would be optimal for a flat diffuse surface. But their weights are unbounded where the shading normal leans away from the geometric
-//! normal.
+//! would be optimal for a flat diffuse surface. But their weights are unbounded where the shading normal leans
+//! away from the geometric normal.
 
 use std::f32::consts::PI;
 

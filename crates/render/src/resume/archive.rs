@@ -162,7 +162,7 @@ mod tests {
             snapshot.write(&identity, &mut good).expect("bytes");
             for seed in 0..4000 {
                 let mut bytes = good[..good.len() - CHECKSUM].to_vec();
-                // Sizes stand at the beginning, sums in the rest.
+                // Sizes are at the beginning, sums in the rest.
                 let random = |n: u64| mix(seed * 16 + n) as usize;
                 for change in 0..1 + random(0) as u64 % 3 {
                     let span = if random(1) % 4 == 0 {

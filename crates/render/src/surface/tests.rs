@@ -126,7 +126,7 @@ fn check(body: &Body, center: Vec3, what: &str) {
         rays.push(ray);
         hits.push(Some(hit));
         let surface = Surface::found(&shapes, &ray, &hit);
-        // The direction of the ray may be lost to rounding; that of the wall is not.
+        // The direction of the ray may be lost to rounding; the direction of the wall is not.
         let inward = planes[triangle].1.as_vec3();
         let local = cosine_hemisphere(stream.pair(13));
         let leaving = surface.ray_along(Frame::around(inward).to_world(local));

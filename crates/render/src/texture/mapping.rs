@@ -66,7 +66,7 @@ impl Mapping {
                 Vec2::new(libm::acosf(w.z.clamp(-1.0, 1.0)) * FRAC_1_PI, turn)
             }),
             Self::Cylindrical { texture_from_world } => around(place, 0.01, Vec2::X, |p| {
-                // As in pbrt-v3, the height is that of the direction.
+                // As in pbrt-v3, the height is taken from the direction.
                 let w = texture_from_world.project_point3(p).normalize_or(Vec3::Z);
                 Vec2::new((PI + libm::atan2f(w.y, w.x)) / TAU, w.z)
             }),

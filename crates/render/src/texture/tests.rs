@@ -148,7 +148,7 @@ fn mappings() {
             "{point}"
         );
     }
-    // One step along the equator, across the line where the azimuth starts anew.
+    // One step along the equator, across the line where the azimuth starts again.
     for (mapping, expected, seam) in [
         (spherical, Vec2::new(0.0, 0.01 / (2.0 * PI)), Vec3::X),
         (cylindrical, Vec2::new(0.01 / (2.0 * PI), 0.0), -Vec3::X),

@@ -70,7 +70,7 @@ fn furnaces() {
     }
 }
 
-/// A body in an open scene, whose light comes from a sky alone: nothing is reflected back.
+/// A body in an open scene, whose light comes only from a sky: nothing is reflected back.
 #[test]
 fn a_convex_body_under_a_uniform_sky_has_its_reflectance() {
     for kind in [SamplerKind::Random, SamplerKind::Halton] {
@@ -103,7 +103,7 @@ fn over_a_plane(light: impl FnOnce(&mut Scene)) -> Scene {
     scene
 }
 
-/// Irradiance over π times the reflectance, whichever way the light is asked.
+/// Irradiance over π times the reflectance, whichever way the light is sampled.
 #[track_caller]
 fn reflects(scene: &mut Scene, irradiance: f64, what: &str) {
     for integrator in [

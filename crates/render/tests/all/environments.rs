@@ -1,4 +1,4 @@
-//! Light from images, asked in every way there is.
+//! Light from images, sampled in every way.
 //!
 //! - over a plane, against closed forms
 //! - what the camera sees of it
@@ -107,7 +107,7 @@ fn a_plane_reflects_the_integral_of_an_octahedron() {
         let height = 1.0 - part(x) - part(y);
         let radius = 1.0 - height.abs();
         let cos = 1.0 - radius * radius;
-        // The lower half is black, to tell the halves apart.
+        // The lower half is black, to distinguish the halves.
         [if height > 0.0 { cos * cos } else { 0.0 }; 3]
     });
     if let Light::Infinite {
@@ -179,7 +179,7 @@ fn things() -> Scene {
 }
 
 /// A light beyond the floor that lights nothing, but whose power outshines all. Chosen by power, no other light has
-/// samples, and scattering alone finds the light of others.
+/// samples, and only scattering finds the light of others.
 fn decoy() -> Light {
     Light::Point {
         position: Vec3::new(0.0, 0.0, 50.0),

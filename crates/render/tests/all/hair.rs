@@ -58,7 +58,7 @@ fn scene_of(material: Material) -> Scene {
     scene
 }
 
-/// White hair in a world of radiance 1: light that goes through a hair does not meet the hair again.
+/// White hair in a world of radiance 1: light that goes through a hair does not hit the hair again.
 #[test]
 fn white_hair_vanishes_in_a_uniform_world() {
     let mut scene = scene_of(hair(0.0));

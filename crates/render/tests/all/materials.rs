@@ -234,7 +234,7 @@ fn absent_surfaces() {
             0.0,
             "seen through",
         );
-        // The last point of a path is only asked for its emission.
+        // Only the emission of the last point of a path is used.
         let mut ends = world(integrator);
         if let Integrator::Path { max_depth, .. } = &mut ends.integrator {
             *max_depth = 0;
@@ -266,7 +266,7 @@ fn absent_surfaces() {
         "open",
     );
 
-    // A floor under a surface that is not there gets nothing from the sky, however it is asked.
+    // A floor under a surface that is not there gets nothing from the sky, however the sky is sampled.
     for integrator in [path(1), path(3), direct(1)] {
         let mut scene = empty();
         scene.integrator = integrator;

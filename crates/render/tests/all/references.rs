@@ -1,6 +1,6 @@
 //! Pictures of the shared scenes against references made with pbrt-v3.
 //!
-//! Few samples, so that the test is quick: the limits are those of chance at that number. The example
+//! Few samples, so that the test is quick: the limits allow for chance at that number. The example
 //! `reference` does the same with many.
 
 use std::io::Write;

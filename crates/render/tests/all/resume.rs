@@ -48,7 +48,7 @@ fn options() -> Options {
     }
 }
 
-/// Stops in one of so many batches and keeps what it is given; or asks for everything to be kept.
+/// Stops in one of so many batches and keeps what it is given; or requests that everything is kept.
 struct Stop {
     left: AtomicU64,
     every_wave: bool,
@@ -75,7 +75,7 @@ impl Monitor for Stop {
     }
 
     fn wants_snapshot(&self) -> bool {
-        // Asked before every batch, by several threads.
+        // Called before every batch, by several threads.
         let left = &self.left;
         let _ = left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| {
             left.checked_sub(1)
@@ -194,7 +194,7 @@ fn begun(world: &World, shard: Shard) -> Option<Snapshot> {
         shard,
         ..Task::default()
     };
-    // The monitor is asked before each of the three batches of a tile.
+    // The monitor is called before each of the three batches of a tile.
     let stop = Stop::after(3);
     match render_task(world, &options, task, &stop) {
         Ok((_, empty)) => {

@@ -75,7 +75,7 @@ fn every_sampler_has_the_same_mean() {
     }
 }
 
-/// The mean squared difference from a good picture, over that of independent samples.
+/// The mean squared difference from a good picture, over the same mean for independent samples.
 #[test]
 fn stratified_pictures_have_less_noise() {
     let mut scene = scene();

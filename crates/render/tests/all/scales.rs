@@ -1,7 +1,7 @@
 //! Scenes tiny, huge and far from the origin: no surface shades itself, none leaks.
 //!
 //! - a scene scaled by a power of two gives the same picture, bit for bit
-//! - a convex body sees all of its sky, wherever it stands and however large it is
+//! - a convex body sees all of its sky, wherever it is and however large it is
 //! - furnaces at every scale
 //! - samples that are not finite are counted and leave their pixel alone
 
@@ -140,7 +140,7 @@ fn tetrahedron(center: Vec3, size: f32) -> Geometry {
     }))
 }
 
-/// Where bodies stand: centre and size.
+/// Places of bodies: centre and size.
 fn places() -> Vec<(Vec3, f32)> {
     let mut places: Vec<_> = [1e-7, 1e-5, 1e-2, 1.0, 1e3, 1e5, 1e7]
         .map(|size| (Vec3::ZERO, size))

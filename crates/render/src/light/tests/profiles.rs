@@ -90,7 +90,7 @@ fn projections_throw_their_image() {
         9.0 * 4.0 * std::f64::consts::PI / 6.0,
         "power",
     );
-    // Twice as wide as high: the angle is that of the height, and rows grow with y.
+    // Twice as wide as high: the angle spans the height, and rows grow with y.
     let wide = light(Some(image(8, 4, |x, y| [x as f32, y as f32, 1.0])), 90.0);
     for (x, y) in (0..8).flat_map(|x| (0..4).map(move |y| (x, y))) {
         let place = [(x as f32 + 0.5) / 4.0 - 1.0, (y as f32 + 0.5) / 2.0 - 1.0];

@@ -91,7 +91,7 @@ pub fn heap(seed: u64) -> Scene {
     scene
 }
 
-/// Materials whose lobes stand side by side, and one that is not there.
+/// Materials whose lobes are side by side, and one that is not there.
 fn layered() -> [Material; 5] {
     let grey = |value: f32| Param::Constant(Rgb::splat(value));
     let roughness = [0.1, 0.3].map(Param::Constant);
