@@ -18,7 +18,7 @@ const RAYS: usize = 1 << 14;
 /// Most points that a thread takes at a time, however few rays they have.
 const MOST_POINTS: usize = 1 << 12;
 
-/// Choices of [`ambient_occlusion`].
+/// Rays, distance and weights of [`ambient_occlusion`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AmbientOcclusion {
     /// Rays per point and side, at least 1. Powers of two are spread most evenly.

@@ -6,7 +6,7 @@ use jiff::tz::TimeZone;
 
 use crate::Moment;
 
-/// Clocks of a place.
+/// Rule of local time at a place: a fixed offset or a time zone.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Clock {
     /// Hours ahead of UTC, without summer time.

@@ -4,16 +4,16 @@ use crate::moment::Moment;
 use crate::perez::Irradiance;
 use crate::sun::Place;
 
-/// A weather file.
+/// A weather file in EnergyPlus format (.epw).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weather {
     /// Name of the place: city, region and country.
     pub name: String,
-    /// The place.
+    /// Latitude, longitude and elevation of the station.
     pub place: Place,
-    /// Hours that its clocks are ahead of UTC, without summer time.
+    /// Hours that the clocks of the file are ahead of UTC, without summer time.
     pub zone: f64,
-    /// What was measured, in the order of the file.
+    /// Records of the weather, in the order of the file.
     pub records: Vec<Record>,
     /// Number of records whose direct or diffuse irradiance is missing, and counts as 0.
     pub incomplete: usize,

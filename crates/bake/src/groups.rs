@@ -92,13 +92,13 @@ impl Groups {
 /// Statistics of the sensors of a group.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistics {
-    /// Number of sensors.
+    /// Number of sensors whose value is a number.
     pub count: usize,
-    /// Mean value.
+    /// Mean value, each sensor weighing the same. NaN without a sensor.
     pub mean: f64,
-    /// Smallest value.
+    /// Smallest value. NaN without a sensor.
     pub least: f64,
-    /// Largest value.
+    /// Largest value. NaN without a sensor.
     pub most: f64,
 }
 

@@ -16,7 +16,7 @@ pub struct HeightField<'a> {
     width: usize,
     height: usize,
     rows: &'a [f64],
-    /// Heights column by column.
+    /// Heights column by column: a transposed copy of `rows`.
     columns: Vec<f64>,
     /// Tops of rows and of columns: see [`tops`].
     tops: [Vec<f64>; 2],

@@ -78,7 +78,7 @@ impl Key {
         self.0.update(text.as_bytes());
     }
 
-    /// Adds vectors.
+    /// Adds the length of the list and the bits of its numbers.
     pub fn vectors(&mut self, vectors: &[[f32; 3]]) {
         let numbers = vectors.as_flattened();
         self.0.update(&(numbers.len() as u64).to_le_bytes());
@@ -91,7 +91,7 @@ impl Key {
         }
     }
 
-    /// Adds numbers.
+    /// Adds the length of the list and the bits of its numbers.
     pub fn numbers(&mut self, numbers: &[f64]) {
         self.0.update(&(numbers.len() as u64).to_le_bytes());
         let mut bytes = Vec::with_capacity(8 * numbers.len().min(1 << 12));

@@ -31,7 +31,7 @@ impl SunlightClass {
         found.map_or(Self::None, |(_, class)| class)
     }
 
-    /// Name in tables.
+    /// Name in tables: `none`, `minimum`, `medium` or `high`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::None => "none",

@@ -6,7 +6,7 @@ use std::str::FromStr;
 /// A date and a time of day in some time zone, by the Gregorian calendar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
-    /// Year.
+    /// Year of the Gregorian calendar.
     pub year: i32,
     /// Month, 1 to 12.
     pub month: u32,

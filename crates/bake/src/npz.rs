@@ -47,7 +47,7 @@ impl Array<'_> {
         }
     }
 
-    /// Size in bytes.
+    /// Size of the values in the file in bytes, without the header.
     pub fn bytes(&self) -> u64 {
         let of_one = match self {
             Self::F64(_) | Self::Counts(_) => 8,

@@ -16,11 +16,11 @@ pub enum UpAxis {
 /// East, north and up in a scene, as vectors of length 1 that are at right angles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orientation {
-    /// East.
+    /// Unit vector to the east in coordinates of the scene.
     pub east: [f64; 3],
-    /// North.
+    /// Unit vector to the north in coordinates of the scene.
     pub north: [f64; 3],
-    /// Up.
+    /// Unit vector upwards in coordinates of the scene.
     pub up: [f64; 3],
 }
 

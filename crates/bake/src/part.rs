@@ -15,7 +15,7 @@ pub struct Identity {
     pub key: u64,
     /// Number of items of the job.
     pub items: usize,
-    /// Items of a chunk.
+    /// Number of items of a chunk. The last chunk may have fewer.
     pub chunk: usize,
     /// Command line that computes the answers: a note for whoever joins parts.
     pub command: Vec<OsString>,

@@ -7,7 +7,7 @@ use crate::orientation::dot;
 use crate::visibility::above;
 use crate::{Error, Label, Layout, Mesh, Orientation, Sensors, memory};
 
-/// Kind of a surface.
+/// Kind of a surface, by its slope and by what is below.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Surface {
     /// Faces up, within 60 degrees, with a surface below.

@@ -20,7 +20,7 @@ pub struct Sensors {
 /// Texts of sensors that come back in tables of results: a column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Label {
-    /// Name of the column.
+    /// Name of the column in tables of results.
     pub column: String,
     /// Texts, `[n]`.
     pub values: Vec<String>,

@@ -17,14 +17,14 @@ use crate::{
 /// Most steps of time.
 const MOST_STEPS: f64 = 1e7;
 
-/// A step of time.
+/// A step of time, with the irradiance of the sun and the sky.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimeStep {
     /// Middle of the step in Unix time.
     pub middle: f64,
     /// Beginning of the step on local clocks.
     pub begin: Moment,
-    /// Length in hours.
+    /// Length of the step in hours.
     pub hours: f64,
     /// Mean irradiance over the step; 0 where nothing was measured.
     pub irradiance: Irradiance,
@@ -106,7 +106,7 @@ impl Weather {
 pub struct Suns {
     /// Middle of each step in Unix time.
     pub times: Vec<f64>,
-    /// Positions in the sky.
+    /// Position of each sun in the sky.
     pub positions: Vec<SunPosition>,
     /// Hours that each sun stands for.
     pub hours: Vec<f64>,

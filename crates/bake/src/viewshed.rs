@@ -16,7 +16,7 @@ use crate::{BitMatrix, Error, Job, Key, Monitor, memory};
 pub struct Observer {
     /// Column and row, where the centre of the first cell is at 0, 0: see [`HeightField::place`].
     pub place: [f64; 2],
-    /// Height of the eye.
+    /// Height of the eye, measured from the same zero as heights of the field.
     pub height: f64,
     /// Normal of the surface that the observer is on, in map coordinates; nothing behind it is seen. 0 for a free eye.
     pub normal: [f64; 3],
@@ -31,7 +31,7 @@ pub struct Observer {
 /// All is computed in double precision. Bits are the same for any number of threads and shares.
 #[derive(Clone, Debug)]
 pub struct ViewshedJob<'a> {
-    /// The surface.
+    /// Surface with the cells that observers look at.
     pub field: &'a HeightField<'a>,
     /// Who looks.
     pub observers: &'a [Observer],

@@ -9,7 +9,7 @@ pub struct Film {
     pub resolution: [u32; 2],
     /// Crop window `[x_min, x_max, y_min, y_max]` in fractions of the full picture, within 0..=1.
     pub crop_window: [f32; 4],
-    /// Reconstruction filter.
+    /// Reconstruction filter, which weighs samples by their distance from the centre of a pixel.
     pub filter: Filter,
     /// Factor of every pixel value, applied at the end.
     pub scale: f32,

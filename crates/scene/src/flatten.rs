@@ -21,14 +21,14 @@ pub enum Error {
         instance: usize,
         /// Index of the object, which is too large.
         object: usize,
-        /// Number of objects.
+        /// Number of objects in the scene.
         objects: usize,
     },
     /// An instance scales a sphere differently by axis.
     Ellipsoid {
         /// Position of the instance in the scene.
         instance: usize,
-        /// Name of the object.
+        /// Name of the object that has the sphere.
         object: String,
     },
     /// An instance moves.
@@ -40,7 +40,7 @@ pub enum Error {
     TooLarge {
         /// Number of triangles of the flattened scene.
         triangles: u64,
-        /// Number of instances.
+        /// Number of instances in the scene.
         instances: usize,
     },
 }

@@ -12,14 +12,14 @@ use crate::{Image, Rgb};
 pub enum Light {
     /// Point light with equal intensity in every direction.
     Point {
-        /// World position.
+        /// Position in world space.
         position: Vec3,
-        /// Radiant intensity.
+        /// Radiant intensity, equal in every direction.
         intensity: Rgb,
     },
     /// Point light limited to a cone with a smooth edge.
     Spot {
-        /// World position.
+        /// Position in world space.
         position: Vec3,
         /// Unit axis of the cone in world space.
         axis: Vec3,

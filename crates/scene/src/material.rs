@@ -33,7 +33,7 @@ pub enum Material {
     },
     /// Perfect mirror without Fresnel effect.
     Mirror {
-        /// Reflectance.
+        /// Reflectance, the same for all directions.
         kr: Param<Rgb>,
     },
     /// Dielectric interface: smooth if both roughnesses are 0, microfacets otherwise.
@@ -224,11 +224,11 @@ pub enum Pigment {
 pub enum Interior {
     /// By coefficients per scene unit of length.
     Coefficients {
-        /// Absorption coefficient.
+        /// Absorption coefficient per scene unit, before `scale`.
         absorption: Param<Rgb>,
-        /// Scattering coefficient.
+        /// Scattering coefficient per scene unit, before `scale`.
         scattering: Param<Rgb>,
-        /// Factor of both.
+        /// Factor of both coefficients.
         scale: f32,
     },
     /// By the look of a flat body.

@@ -119,12 +119,12 @@ impl TriangleMesh {
     }
 }
 
-/// Full sphere.
+/// Full sphere in world space, or in the space of its object.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Sphere {
-    /// Centre.
+    /// Centre in the same space.
     pub center: Vec3,
-    /// Radius, positive.
+    /// Radius in scene units, positive.
     pub radius: f32,
 }
 

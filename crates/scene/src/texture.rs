@@ -93,7 +93,7 @@ pub enum Texture<T> {
     VertexColor,
     /// 1 where the value is at least `least`, and 0 elsewhere: a hard edge for an alpha mask.
     AtLeast {
-        /// Value compared.
+        /// Value that is compared with `least`.
         value: Param<f32>,
         /// Smallest value that counts as 1.
         least: f32,
@@ -126,7 +126,7 @@ pub enum NoisePattern {
     },
 }
 
-/// Octaves of noise.
+/// Number of octaves of noise, and their amplitudes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Octaves {
     /// Most octaves. Those that a pixel cannot show are left out.

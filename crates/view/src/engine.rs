@@ -302,7 +302,7 @@ impl<'a> Engine<'a> {
         self.last = Some(kept.look);
         self.show(1, film, wish.mode, Arc::clone(&kept.tiles));
         self.shared.tell(|status| {
-            // Samples of another camera do not belong to this one.
+            // Tests counted for another camera do not belong to this one.
             let is_same = status.look == Some(kept.look);
             *status = Status {
                 wish: wish.number,

@@ -7,7 +7,7 @@ const HEAD: u64 = 16 << 10;
 /// Longest body of a request in bytes.
 const BODY: usize = 64 << 10;
 
-/// A request.
+/// An HTTP request of a page.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Request {
     /// `GET`, `POST` and so on.
@@ -18,7 +18,7 @@ pub struct Request {
     pub query: String,
     /// Host that the browser believes to ask.
     pub host: String,
-    /// The body.
+    /// Body of the request, at most 64 KiB.
     pub body: Vec<u8>,
     /// Whether the connection ends after the answer.
     pub close: bool,

@@ -376,7 +376,7 @@ const JSON: &str = "application/json";
 #[derive(Serialize)]
 struct Day<'a> {
     caption: &'a str,
-    /// Hours of a step.
+    /// Hours of a step of the diagram of a point.
     step: f64,
     /// Hours at the light end of the colours.
     longest: f32,

@@ -60,11 +60,11 @@ pub struct Wish {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Change {
-    /// Camera.
+    /// Camera to render with.
     pub look: Option<Look>,
     /// Back to the scene's own camera.
     pub home: bool,
-    /// Part of the picture.
+    /// Part of the picture, `[x0, x1, y0, y1]` in fractions of it.
     pub crop: Option<[f32; 4]>,
     /// Back to the scene's own part of the picture.
     pub whole: bool,
@@ -127,9 +127,9 @@ pub struct Status {
     pub elapsed: f64,
     /// Seconds that the rest may take; `None` if unknown.
     pub remaining: Option<f64>,
-    /// Samples per second.
+    /// Samples of all pixels per second.
     pub samples_per_second: f64,
-    /// Rays per second.
+    /// Rays of any kind per second.
     pub rays_per_second: f64,
     /// Whether the tree has learned from this camera.
     pub learned: bool,
@@ -154,7 +154,7 @@ pub struct Frame {
     pub resolution: [u32; 2],
     /// What is shown.
     pub mode: Mode,
-    /// The pixels.
+    /// Tiles with the pixels, which threads publish while they render.
     pub tiles: Arc<LiveTiles>,
 }
 

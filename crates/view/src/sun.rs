@@ -8,7 +8,7 @@ use antumbra_render::{KeptTree, Sight, World};
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// The suns of a day.
+/// Course of the sun in one day at a place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SunDay {
     /// Date and place in words.
@@ -158,7 +158,7 @@ pub struct Probe {
     pub origin: [f64; 3],
 }
 
-/// The day of a point.
+/// Direct sun at a point in the course of a day.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PointDay {
     /// Place in the world.

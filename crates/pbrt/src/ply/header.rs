@@ -72,7 +72,7 @@ pub(super) struct Element {
     pub name: String,
     pub count: u64,
     pub properties: Vec<Property>,
-    /// Line in the header.
+    /// Line of the file that declares the element.
     pub line: u64,
 }
 

@@ -25,7 +25,7 @@ use crate::source::read_regular_file_that;
 pub struct PlyError {
     /// Path of the file.
     pub path: PathBuf,
-    /// Place of the mistake.
+    /// Line or byte of the mistake.
     pub place: PlyPlace,
     /// Problem, with the value found.
     pub message: String,
