@@ -28,7 +28,7 @@ pub(super) struct PixelSums {
     pub window: Window,
     /// Sums of weight * value.
     weighted: Vec<[f64; 3]>,
-    /// Numbers of samples.
+    /// Number of samples of each pixel.
     samples: Counts,
     /// Sums of weights. Empty if every sample weighs 1.
     weights: Vec<f64>,

@@ -9,7 +9,7 @@ use super::rules::Rules;
 use super::sums::PixelSums;
 use crate::color::luminance;
 
-/// Film of one tile.
+/// Sums of samples over the pixels that one tile reaches.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TileFilm {
     rules: Rules,

@@ -44,7 +44,7 @@ pub mod dimension {
     pub const FILM: u32 = 0;
     /// Position on the lens.
     pub const LENS: u32 = 1;
-    /// Time.
+    /// Time between opening and closing of the shutter.
     pub const TIME: u32 = u32::MAX;
     /// First dimension of the integrator.
     pub const FIRST: u32 = 2;
@@ -77,7 +77,7 @@ pub struct Batch {
 pub struct SampleCost {
     /// Node tests plus primitive tests.
     pub tests: u64,
-    /// Shadow rays.
+    /// Number of shadow rays.
     pub rays: u64,
 }
 

@@ -29,11 +29,11 @@ pub enum Observe<'b> {
 /// Sums over the queries of one thread.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Counts {
-    /// Closest-hit rays.
+    /// Number of closest-hit rays.
     pub closest_rays: u64,
-    /// Shadow rays.
+    /// Number of shadow rays, occluded or not.
     pub shadow_rays: u64,
-    /// Shadow rays that are occluded.
+    /// Number of shadow rays that are occluded.
     pub occluded_rays: u64,
     /// Node tests of shadow rays, where counted.
     pub node_tests: u64,
@@ -72,7 +72,7 @@ pub struct Tracer<'b> {
     /// The tree that moves, if there is one, and the times that its rays can have. It answers, and `bvh` only counts and
     /// learns, where everything is half way.
     moving: Option<(&'b MovingBvh, Times)>,
-    /// Times of the samples of the batch.
+    /// Time of each sample of the batch, from 0 to 1.
     sample_times: Vec<f32>,
     /// Times of the rays under way.
     times: Vec<f32>,

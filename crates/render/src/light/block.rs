@@ -44,7 +44,7 @@ pub struct Asked {
 /// Choice of one light per lane.
 #[derive(Clone, Debug)]
 pub struct Chosen {
-    /// Index of the light.
+    /// Index of the light in [`Lights::all`].
     pub light: Flags,
     /// Element of the light, unless lights are sampled as wholes.
     pub element: Flags,
@@ -57,9 +57,9 @@ pub struct Chosen {
 /// Request for one of several samples of an element of a light.
 #[derive(Clone, Copy, Debug)]
 pub struct ElementSample {
-    /// Index of the light.
+    /// Index of the light in [`Lights::all`].
     pub light: usize,
-    /// Element of the light.
+    /// Element of the light: the triangle of a mesh.
     pub element: usize,
     /// Number of samples of the element.
     pub samples: u32,

@@ -37,7 +37,7 @@ pub struct SphereDistribution {
 pub struct Choice {
     /// Direction of unit length, but for rounding.
     pub direction: Vec3,
-    /// Place in the image.
+    /// Place in the image: fractions of its width and of its height, row 0 first.
     pub place: [f32; 2],
     /// Density per solid angle. 0 if the image is black.
     pub pdf: f32,

@@ -15,14 +15,14 @@ use crate::surface::Frame;
 /// Uniform radiance from every direction that leaves the scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Sky {
-    /// Radiance.
+    /// Radiance of every direction.
     pub radiance: Vec3,
     /// Samples per point. 0 counts as 1.
     pub samples: u32,
 }
 
 impl Sky {
-    /// Sample of a direction.
+    /// Sample of a direction, cosine-weighted or uniform over the hemispheres that count.
     #[inline]
     pub fn sample(&self, at: &Receiver, u: [f32; 2]) -> Option<LightSample> {
         let draw = draw(at.both_sides, u);

@@ -5,9 +5,9 @@ use glam::Vec3;
 /// Intensity of a spot by direction.
 #[derive(Clone, Copy, Debug)]
 pub struct Spot {
-    /// Unit axis.
+    /// Unit vector along the axis of the cone, away from the light.
     pub axis: Vec3,
-    /// Intensity on the axis.
+    /// Radiant intensity on the axis.
     pub intensity: Vec3,
     /// Cosine of the angle at which the light ends.
     pub cos_total_width: f32,

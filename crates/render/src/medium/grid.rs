@@ -17,7 +17,7 @@ pub struct Grid {
     size: [u32; 3],
     values: Arc<[f32]>,
     grid_from_world: Mat4,
-    /// Largest density.
+    /// Largest density of a cell, at least 0.
     largest: f32,
 }
 

@@ -18,7 +18,7 @@ use crate::world::World;
 
 /// State that all threads of a rendering share.
 pub struct Job<'a> {
-    /// The scene.
+    /// Scene that is rendered.
     pub world: &'a World,
     /// Observer of the rendering.
     pub monitor: &'a dyn Monitor,

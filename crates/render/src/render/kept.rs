@@ -82,7 +82,7 @@ impl KeptTree {
 /// Place on a surface that a camera sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sight {
-    /// The place.
+    /// Position in the space of the scene.
     pub point: [f32; 3],
     /// Geometric normal of length 1, on the side of the camera.
     pub normal: [f32; 3],

@@ -28,7 +28,7 @@ pub struct Layers {
     pub normal: Vec<Vec3>,
     /// Shading normal, bump and normal maps included, in the world.
     pub shading_normal: Vec<Vec3>,
-    /// Position in the world.
+    /// Mean position in the world.
     pub position: Vec<Vec3>,
     /// Distance from the camera along its axis.
     pub depth: Vec<f32>,

@@ -78,7 +78,7 @@ pub fn first_tree(
     Ok((bvh, times.tree + times.log + times.collapse))
 }
 
-/// Builder of the first tree.
+/// Builder of the first tree: binned SAH for a builder that waits for training rays, otherwise the recipe's.
 pub fn first_builder(recipe: &Recipe) -> Builder {
     if recipe.builder.needs_rays() && recipe.order.learns() {
         Builder::BinnedSah

@@ -88,12 +88,12 @@ impl<'a> Paths<'a> {
         self.tiles.count()
     }
 
-    /// Pixels of a tile.
+    /// Window of the pixels of a tile.
     pub fn tile(&self, index: usize) -> Window {
         self.tiles.window(index)
     }
 
-    /// Tile of a pixel.
+    /// Index of the tile of a pixel.
     pub fn tile_of(&self, [x, y]: [i32; 2]) -> usize {
         self.tiles.of(x, y)
     }

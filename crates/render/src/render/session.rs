@@ -34,7 +34,7 @@ pub struct Session<'a> {
 /// A picture whose queries were observed.
 #[derive(Clone, Debug)]
 pub struct ObservedPicture {
-    /// The picture.
+    /// Picture of all samples.
     pub image: Image,
     /// Rays of the main pass.
     pub counts: Counts,

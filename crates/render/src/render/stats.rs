@@ -22,11 +22,11 @@ pub struct Stats {
     pub threads: usize,
     /// Name of the generator of random values, see [`crate::Method`].
     pub sampler: &'static str,
-    /// Closest-hit rays.
+    /// Number of closest-hit rays.
     pub closest_rays: u64,
-    /// Shadow rays: occlusion queries, which find only whether anything is in the way.
+    /// Number of shadow rays: occlusion queries, which find only whether anything is in the way.
     pub shadow_rays: u64,
-    /// Shadow rays that are occluded.
+    /// Number of shadow rays that are occluded.
     pub occluded_rays: u64,
     /// Training rays of the child order. With a learned collapse, a sample of the shadow rays of the pre-pass.
     pub logged_rays: u64,

@@ -29,7 +29,7 @@ pub struct SurfaceBlock {
 pub struct ShapeHit {
     /// Position in the scene's list of shapes.
     pub shape: u32,
-    /// Instance of the kernel.
+    /// Instance that was hit, by the kernel's `inst_id`.
     pub inst_id: u32,
     /// Triangle of the mesh. 0 on a sphere.
     pub primitive: u32,
@@ -184,13 +184,13 @@ impl SurfaceBlock {
         }
     }
 
-    /// Columns of the surfaces.
+    /// Surfaces of all lanes, as one column per number.
     #[inline]
     pub fn columns(&self) -> &Surfaces {
         &self.surfaces
     }
 
-    /// Surface of a lane.
+    /// Surface of a lane, with all its numbers.
     #[inline]
     pub fn surface(&self, lane: usize) -> Surface {
         let (columns, hit) = (&self.surfaces, &self.hit[lane]);

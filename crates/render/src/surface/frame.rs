@@ -46,7 +46,7 @@ impl Frame {
         Self { x, y, z }
     }
 
-    /// Axes of the frame.
+    /// Axes x, y and z of the frame in world space.
     #[inline(always)]
     pub fn axes(self) -> [Vec3; 3] {
         [self.x, self.y, self.z]

@@ -34,7 +34,7 @@ pub fn vertex_color(mesh: &TriangleMesh, triangle: u32, weights: [f32; 3]) -> Op
 /// Positions and normals at the vertices of a triangle.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Vertices {
-    /// Positions.
+    /// Positions of the three vertices.
     pub corners: [Vec3; 3],
     /// Normals. All 0 if the mesh has none.
     pub normals: [Vec3; 3],
@@ -113,7 +113,7 @@ pub fn oriented(
     }
 }
 
-/// Plane of a triangle.
+/// Plane of a triangle: its normal and twice its area.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Plane {
     /// Direction of `(p1 - p0) x (p2 - p0)`. Some unit vector for a degenerate triangle.

@@ -15,7 +15,7 @@ pub struct Lesson {
 }
 
 impl Lesson {
-    /// The rays.
+    /// Training rays.
     pub fn rays(&self) -> &[Ray] {
         &self.rays
     }

@@ -11,7 +11,7 @@ use crate::sampler::mix;
 pub enum TrainingSample {
     /// Training log of every ray, for an order of the tree that was traced.
     Log {
-        /// The training log.
+        /// Training log of all rays so far.
         log: Box<Log>,
         /// Some of the rays, for later trees.
         rays: RaySample,

@@ -13,9 +13,9 @@ use crate::texture::Textures;
 /// Geometry of a scene, as the kernel takes it. Meshes are borrowed from the scene.
 #[derive(Debug, Default)]
 pub struct Lowered<'s> {
-    /// Shapes of the world.
+    /// Shapes that are in the world without an instance.
     pub world: Vec<antumbra::Geometry<'s>>,
-    /// The shapes of every object.
+    /// Shapes of every object, in the space of the object.
     pub objects: Vec<Vec<antumbra::Geometry<'s>>>,
     /// Placed objects, where they are at time 0.
     pub instances: Vec<antumbra::Instance>,
@@ -93,7 +93,7 @@ fn of_instance(instance: &Instance) -> antumbra::Instance {
     antumbra::Instance::new(object(instance), rows(&instance.world_from_object))
 }
 
-/// An instance with its keys.
+/// Instance with its transforms: at time 0, and at time 1 if it moves.
 pub fn moving_instance(instance: &Instance) -> MovingInstance {
     let keys = [Some(instance.world_from_object), instance.end];
     let keys = keys.iter().flatten().map(rows).collect();

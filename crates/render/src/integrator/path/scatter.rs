@@ -133,7 +133,7 @@ impl Continuations {
         run(isa, stage, &mut self.followed);
     }
 
-    /// Queues the rays.
+    /// Adds the rays of the lanes that go on to `next`, with the state of their paths.
     pub fn queue(&self, vertices: &Vertices, asked: &Asked, next: &mut Paths) {
         let found = &self.followed;
         for lane in 0..vertices.count() {

@@ -77,7 +77,7 @@ impl Lights {
         }
     }
 
-    /// All lights.
+    /// All lights, in the order of their indices.
     #[inline]
     pub fn all(&self) -> &[Light] {
         &self.lights

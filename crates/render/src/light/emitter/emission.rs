@@ -114,7 +114,7 @@ impl Emission {
         self.at(element, [1.0 - u - v, u, v])
     }
 
-    /// Area of a triangle.
+    /// Area of a triangle in squared scene units.
     pub fn area(&self, element: usize) -> f32 {
         self.areas[element]
     }

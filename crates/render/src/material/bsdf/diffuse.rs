@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use crate::surface::same_hemisphere;
 
-/// A diffuse reflector.
+/// A diffuse reflector: Lambert's, or the rough one of Oren and Nayar.
 #[derive(Clone, Copy, Debug)]
 pub struct Diffuse {
     reflectance: Vec3,

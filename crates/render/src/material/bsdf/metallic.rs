@@ -18,18 +18,18 @@ use super::microfacet::TrowbridgeReitz;
 use crate::color::luminance;
 use crate::surface::{reflect, same_hemisphere};
 
-/// Parameters of a [`Metallic`].
+/// Parameters of a [`Metallic`], as in glTF 2.0.
 #[derive(Clone, Copy, Debug)]
 pub struct MetallicParameters {
     /// Colour of the base and of the metal.
     pub color: Vec3,
-    /// Share of metal.
+    /// Share of metal, 0..=1.
     pub metallic: f32,
-    /// Perceptual roughness.
+    /// Perceptual roughness, 0..=1. Its square is the microfacet alpha.
     pub roughness: f32,
     /// Reflectance of the dielectric at normal incidence.
     pub coat: Vec3,
-    /// Share of the base that is transparent.
+    /// Share of the base that is transparent, 0..=1.
     pub transparent: f32,
 }
 

@@ -114,7 +114,7 @@ impl Bsdf {
         }
     }
 
-    /// A rough dielectric.
+    /// A rough dielectric. Lobes that are black are left out.
     pub fn rough_glass(reflection: GlossyReflection, transmission: GlossyTransmission) -> Self {
         if reflection.is_black() && transmission.is_black() {
             return Self::Black;

@@ -11,7 +11,7 @@ use crate::surface::refract;
 pub enum Specular {
     /// A mirror without Fresnel effect.
     Mirror {
-        /// Reflectance.
+        /// Reflectance, the same for all directions.
         kr: Vec3,
     },
     /// A smooth dielectric.
@@ -27,19 +27,19 @@ pub enum Specular {
     Sheet {
         /// Share of the light, without the coat.
         kt: Vec3,
-        /// The coat.
+        /// Coat, which reflects a part of the light.
         coat: Coat,
     },
     /// A thin pane: light is reflected at both sides, to and fro, or goes straight on.
     Pane {
-        /// Scale of both.
+        /// Scale of reflection and transmission.
         scale: Vec3,
         /// Index of refraction of the pane.
         eta: f32,
     },
     /// Light that goes straight on.
     Through {
-        /// Share of the light.
+        /// Share of the light that passes.
         share: Vec3,
     },
 }
