@@ -20,7 +20,7 @@ pub struct Look {
 impl Look {
     /// A scene's camera, as if it looked at a point `distance` away.
     ///
-    /// If the camera stands upright by an axis of the scene, `up` is that axis.
+    /// If the camera is upright by an axis of the scene, `up` is that axis.
     pub fn of(camera: &Camera, distance: f32) -> Self {
         let matrix = camera.world_from_camera;
         let eye = matrix.transform_point3(Vec3::ZERO);

@@ -94,7 +94,7 @@ impl Learning {
     }
 }
 
-/// Tells a rendering to stop, and where its tiles go.
+/// Monitor of a rendering: stops it, and receives its tiles.
 struct Watch<'a> {
     shared: &'a Shared,
     tiles: &'a LiveTiles,
@@ -157,7 +157,7 @@ impl<'a> Engine<'a> {
     /// Follows the wishes until a viewer or `cancelled` ends it.
     ///
     /// # Errors
-    /// Those of the renderer, except [`Error::Cancelled`].
+    /// Errors of the renderer, except [`Error::Cancelled`].
     pub fn run(mut self, cancelled: &(dyn Fn() -> bool + Sync)) -> Result<(), Error> {
         let triangles = self.scene.triangle_count();
         self.shared.tell(|status| {

@@ -9,7 +9,7 @@ pub enum Error {
     /// The page cannot be served at a port of this machine.
     #[error("cannot serve a page at port {port} of 127.0.0.1: {source}")]
     Listen {
-        /// The port asked for; 0 is any.
+        /// The requested port; 0 is any free one.
         port: u16,
         /// Reason of the system.
         source: io::Error,

@@ -16,7 +16,7 @@ pub struct Request {
     pub path: String,
     /// What follows the question mark; empty if there is none.
     pub query: String,
-    /// Host that the browser believes to ask.
+    /// Host that the browser names in its request.
     pub host: String,
     /// Body of the request, at most 64 KiB.
     pub body: Vec<u8>,
@@ -103,7 +103,7 @@ const ALWAYS: &str = "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff
 /// Answers with a body.
 ///
 /// # Errors
-/// Those of the connection.
+/// Errors of the connection.
 pub fn answer(
     stream: &mut impl Write,
     status: &str,
@@ -123,7 +123,7 @@ pub fn answer(
 /// Begins an answer that ends with the connection.
 ///
 /// # Errors
-/// Those of the connection.
+/// Errors of the connection.
 pub fn begin_stream(stream: &mut impl Write) -> io::Result<()> {
     let head = format!(
         "HTTP/1.1 200 OK\r\nContent-Type: application/octet-stream\r\nConnection: close\r\n{ALWAYS}\r\n"

@@ -10,7 +10,7 @@
 //! # Source
 //!
 //! - `preview.rs`, `tev.rs`: the first two
-//! - `server.rs`: the page's server: who may ask, and for what
+//! - `server.rs`: the page's server: who may send requests, and which
 //! - `guests.rs`: open connections, and who gives way when there are too many
 //! - `http.rs`: requests and answers
 //! - `stream.rs`: the stream that a page reads

@@ -1,8 +1,8 @@
 //! The page's server.
 //!
-//! # Who may ask
+//! # Who may send requests
 //!
-//! The server listens on 127.0.0.1 alone. Every path begins with a secret of 128 random bits, which only the printed
+//! The server listens only on 127.0.0.1. Every path begins with a secret of 128 random bits, which only the printed
 //! address holds. Requests for another host name are refused, so that no page of the internet can reach it through a
 //! name that leads here. The page itself may load nothing from elsewhere.
 //!
@@ -68,7 +68,7 @@ pub struct Server {
 }
 
 impl Server {
-    /// Starts to serve the page at a port of 127.0.0.1; 0 is any free one. The page says what is told by
+    /// Starts to serve the page at a port of 127.0.0.1; 0 is any free one. The page shows the text of
     /// [`Server::tell`] until [`Server::run`] has a scene.
     ///
     /// # Errors
@@ -122,12 +122,12 @@ impl Server {
         format!("http://127.0.0.1:{}/{}/", self.port, self.secret)
     }
 
-    /// Tells the viewers what is being done before there is a picture.
+    /// Shows viewers what is being done before there is a picture.
     pub fn tell(&self, text: &str) {
         self.shared.tell(|status| text.clone_into(&mut status.text));
     }
 
-    /// Tells the viewers that there will be no picture, and why. Gives their pages time to read it.
+    /// Shows viewers that there will be no picture, and why. Gives their pages time to read it.
     pub fn fail(&self, text: &str) {
         self.shared.tell(|status| {
             status.phase = Phase::Failed;
@@ -138,7 +138,7 @@ impl Server {
 
     /// Renders what the viewers wish, until one of them or `cancelled` ends it.
     ///
-    /// `options.spp` samples per pixel make a picture. The recipe is that of the learned tree. The first tree is that of
+    /// `options.spp` samples per pixel make a picture. The recipe is for the learned tree. The first tree is by
     /// the world's own builder.
     ///
     /// # Errors

@@ -175,7 +175,7 @@ pub struct State {
     pub day: Vec<u8>,
     /// What clicks on points see, where there is a day of sun.
     pub probe: Option<Probe>,
-    /// Whether a viewer has asked to end.
+    /// Whether a viewer has requested the end.
     pub quit: bool,
     /// Whether the engine has ended.
     pub ended: bool,
@@ -186,7 +186,7 @@ pub struct State {
 pub struct Shared {
     state: Mutex<State>,
     changed: Condvar,
-    /// Copies for the workers, which ask often and must not wait.
+    /// Copies for the workers, which read them often and must not wait.
     newest: AtomicU64,
     quit: AtomicBool,
 }
@@ -213,7 +213,7 @@ impl Shared {
         self.newest.load(Ordering::Relaxed) != wish
     }
 
-    /// Whether a viewer has asked to end. Waits for nobody.
+    /// Whether a viewer has requested the end. Waits for nobody.
     pub fn quits(&self) -> bool {
         self.quit.load(Ordering::Relaxed)
     }

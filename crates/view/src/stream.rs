@@ -18,7 +18,7 @@ use half::f16;
 use crate::state::{Frame, Shared, Status};
 
 /// Time between two looks at the tiles of a frame. Browsers without a graphics processor take 20 ms to paint. New frames,
-/// as those of a moving camera, are sent at once.
+/// as of a moving camera, are sent at once.
 const EVERY: Duration = Duration::from_millis(33);
 /// Longest silence. A page that is gone is noticed by what is sent.
 const SILENCE: Duration = Duration::from_secs(2);
@@ -26,7 +26,7 @@ const SILENCE: Duration = Duration::from_secs(2);
 /// Sends what changes until the page is gone or the engine has ended.
 ///
 /// # Errors
-/// Those of the connection.
+/// Errors of the connection.
 pub fn run(shared: &Shared, stream: &mut impl Write) -> io::Result<()> {
     let mut told = u64::MAX;
     let mut shown: Option<(Arc<Frame>, Seen)> = None;

@@ -125,7 +125,7 @@ struct Sender {
 }
 
 impl Sender {
-    /// Sends until it is told to stop. Returns whether the last picture was sent.
+    /// Sends until a stop is requested. Returns whether the last picture was sent.
     fn run(self) -> bool {
         let mut viewer: Option<Viewer> = None;
         let mut tried: Option<Instant> = None;
