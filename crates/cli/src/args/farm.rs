@@ -62,7 +62,7 @@ pub struct FarmArgs {
     /// As --lines of visible: a .csv of pairs, or a .ply of edges. The last task writes them.
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub lines: Option<PathBuf>,
-    /// render, ao, sun, visible, horizon, factors
+    /// ao, sun, visible, horizon, factors
     #[arg(long = "command", value_name = "COMMAND", value_enum, default_value_t = FarmJob::Render, hide_possible_values = true, help_heading = heading::JOB)]
     pub job: FarmJob,
     /// Standard error of every pixel's mean, as .exr
