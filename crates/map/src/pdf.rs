@@ -22,7 +22,7 @@ const IDENTITY: SystemInfo<'static> = SystemInfo {
     supplement: 0,
 };
 
-/// Objects before those of pictures: catalogue, pages, page, contents, information, and five for each of two fonts.
+/// Number of objects before the pictures: catalogue, pages, page, contents, information, and five for each of two fonts.
 const BEFORE_PICTURES: i32 = 5 + 2 * 5;
 
 /// Letters of a font that a file uses.

@@ -1,4 +1,4 @@
-//! Hits as trimesh tells them: in double precision, and no two of one ray at the same place.
+//! Hits as trimesh returns them: in double precision, and no two of one ray at the same place.
 
 use antumbra::{Batch, Hit};
 use numpy::{PyArray1, PyArrayDyn};
@@ -13,7 +13,7 @@ use crate::memory;
 use crate::rays::{Call, Gathering, PIECE, Piece, RayArrays, RaySource};
 use crate::scene::SceneData;
 
-/// Rays of one thread between two looks for signals, where all hits are asked for.
+/// Rays of one thread between two looks for signals, where all hits are wanted.
 const PIECE_OF_LISTS: usize = 1 << 15;
 
 /// Rays that a thread takes at a time.
@@ -22,7 +22,7 @@ const FEW: usize = 1 << 10;
 /// Rays that come so near to the plane of a triangle, by the sine of the angle, are not brought onto it.
 const PARALLEL: f64 = 1e-9;
 
-/// How hits are told.
+/// How hits are computed, and which count as one.
 pub struct Choices<'a> {
     /// Vertices of the one mesh, not rounded.
     pub vertices: Operand<'a>,
@@ -164,7 +164,7 @@ impl Asking<'_> {
         all
     }
 
-    /// A hit, where the ray as it was given meets the plane of the triangle as it was given.
+    /// A hit, where the ray as it was given intersects the plane of the triangle as it was given.
     fn found(&self, ray: usize, hit: &Hit) -> Option<Found> {
         let corners = *self.indices.get(hit.prim_id as usize)?;
         let [a, b, c] = corners.map(|corner| self.choices.vertices.vector(corner as usize));

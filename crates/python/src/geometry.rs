@@ -24,11 +24,11 @@ pub enum Part {
     Curves(Segments),
 }
 
-/// Meshes and where they stand.
+/// Meshes and where they are placed.
 #[derive(Clone, Default)]
 pub struct Parts {
     pub parts: Vec<Arc<Part>>,
-    /// Parts that stand in the world itself: a place in this list is the kernel's `geom_id`.
+    /// Parts that are in the world without an instance: a place in this list is the kernel's `geom_id`.
     pub world: Vec<u32>,
     /// Parts of every object.
     pub objects: Vec<Vec<u32>>,
@@ -164,7 +164,7 @@ impl Parts {
         Some(masks.instances(self.instance_masks.clone()))
     }
 
-    /// Meshes as they stand in the world, as calls of `mesh`: their vertices before they are placed, their triangles, and
+    /// Meshes as they are placed in the world, as calls of `mesh`: their vertices before they are placed, their triangles, and
     /// the transform. Meshes of the world come first, then the meshes of every instance. Spheres and curves have no triangles.
     pub fn placed<'a>(
         &'a self,

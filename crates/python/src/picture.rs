@@ -45,7 +45,7 @@ pub struct Picture {
     /// Pixels of shape (height, width, 3): float32, linear, or uint8.
     #[pyo3(get)]
     pixels: Py<PyAny>,
-    /// Further layers by name: ``standard_error`` if it was asked for.
+    /// Further layers by name: ``standard_error``, of pictures rendered with ``standard_error=True``.
     #[pyo3(get)]
     aov: Py<PyDict>,
 }

@@ -199,7 +199,7 @@ pub fn closest<'py>(
     Bound::new(py, (Closest, hits))
 }
 
-/// Ray from a point to the nearest one of a surface, on which distances are those of points.
+/// Ray from a point to the nearest point of a surface. Distances along the ray are distances between points.
 fn to_nearest(from: [f32; 3], near: &Option<ClosestPoint>) -> Ray {
     let Some(near) = near else {
         return Ray::default();

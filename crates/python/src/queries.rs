@@ -10,7 +10,7 @@ use crate::memory;
 use crate::rays::{Call, Gathering, PIECE, Piece, RaySource};
 use crate::scene::SceneData;
 
-/// Rays of one thread between two looks for signals, where all hits are asked for.
+/// Rays of one thread between two looks for signals, where all hits are wanted.
 const PIECE_OF_LISTS: usize = 1 << 16;
 
 /// Rows that a thread writes at a time.
@@ -131,7 +131,7 @@ pub struct Choice {
     pub distinct: bool,
 }
 
-/// Finds out which hits of a ray are one: a ray through an edge meets two triangles.
+/// Finds out which hits of a ray are one: a ray through an edge hits two triangles.
 struct Distinct<'a> {
     scene: &'a SceneData,
     bounds: Aabb,
@@ -160,7 +160,7 @@ impl Distinct<'_> {
         &self.kept
     }
 
-    /// Which side of its triangle a ray meets; `None` for spheres, which are hit once.
+    /// Which side of its triangle a ray hits; `None` for spheres, which are hit once.
     fn side(&self, ray: &Ray, hit: &Hit) -> Option<bool> {
         let [a, b, c] = self.scene.parts.corners(Ids::of_hit(self.scene, hit))?;
         let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|axis| corner[axis] - a[axis]));

@@ -25,7 +25,7 @@ pub const PIECE: usize = 1 << 18;
 /// Rays that a thread brings before the kernel at a time, where arrays are not as the kernel takes them.
 const GATHER: usize = 1 << 13;
 
-/// Fewer rays than this stay on the thread that asks.
+/// Up to this many rays stay on the calling thread.
 const FEW: usize = 1 << 14;
 
 /// Rays of a call.
@@ -88,7 +88,7 @@ impl<'py> Call<'py> {
         Ok(())
     }
 
-    /// Asks about all rays, `answers` being as many.
+    /// Traces all rays by `query` in pieces. `answers` has as many items.
     pub fn ask<A: Send>(
         &mut self,
         py: Python<'_>,
@@ -134,7 +134,7 @@ impl<R: RaySource> Piece<'_, R> {
         self.threads.count() == 1 || self.range.len() <= FEW
     }
 
-    /// Asks about these rays, in the order that is fastest by the kernel's rule.
+    /// Traces these rays by `query`, in the order that is fastest by the kernel's rule.
     pub fn ask<A: Send>(
         &self,
         memory: &mut Vec<Ray>,

@@ -16,7 +16,7 @@ use crate::curves::{Place, Segments};
 use crate::geometry::{Part, Parts};
 use crate::scene::{Quality, SceneData, Tree, raised};
 
-/// What pickle keeps of an object: a function that makes it anew, and arguments of that function.
+/// What pickle keeps of an object: a function that makes it again, and arguments of that function.
 pub type Reduced<'py, A> = PyResult<(Bound<'py, PyAny>, A)>;
 
 /// First bytes of a file. The last one is the version: 2 if there are masks, or a world; 3 if there are curves or

@@ -75,7 +75,7 @@ impl SceneData {
         data
     }
 
-    /// The tree to be asked.
+    /// The tree that queries trace.
     pub fn bvh(&self) -> &Bvh {
         match &self.tree {
             Tree::Fixed(bvh) => bvh,

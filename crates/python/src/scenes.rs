@@ -29,7 +29,7 @@ use crate::{file, memory, meshes, saved};
 /// faces : array (m, 3) of integers, optional
 ///     Three vertices per triangle.
 /// instances : sequence of Instance or of (mesh, transform), optional
-///     Placements. A mesh that any instance names stands in the world by its instances only. An ``Assembly`` in the list of meshes has
+///     Placements. A mesh that any instance names is in the world by its instances only. An ``Assembly`` in the list of meshes has
 ///     instances that are placed together.
 /// origin : "auto" or (3,), optional
 ///     Point that the tree has as its zero. Vertices and rays are brought there in double precision, and are then rounded

@@ -6,10 +6,10 @@ use pyo3::exceptions::{PyOverflowError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// Most threads that a call may ask for.
+/// Most threads that a call may have.
 const MOST: usize = 1 << 12;
 
-/// Number of threads that a call asks for, checked.
+/// Number of threads for a call, checked.
 #[derive(Clone, Copy)]
 pub struct ThreadCount(usize);
 

@@ -1,4 +1,4 @@
-//! Work that takes long: Ctrl-C ends it, and progress is told.
+//! Work that takes long: Ctrl-C ends it, and progress is reported.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -10,10 +10,10 @@ use pyo3::prelude::*;
 
 use crate::threads::Threads;
 
-/// How often Python is asked for signals, and told of progress.
+/// Time between two checks for Python's signals, and between two reports of progress.
 const TICK: Duration = Duration::from_millis(100);
 
-/// Whom a call tells how far it is: an object with a method `update(n)`, as tqdm's bars have, or a function of
+/// Receiver of a call's progress: an object with a method `update(n)`, as tqdm's bars have, or a function of
 /// `(done, total)`.
 pub struct Progress<'py> {
     callback: Option<Callback<'py>>,
@@ -41,7 +41,7 @@ impl<'py> Progress<'py> {
         Ok(Self { callback, told: 0 })
     }
 
-    /// Tells that `done` of `total` are done, unless that is known.
+    /// Reports that `done` of `total` are done, unless the receiver knows as many.
     pub fn tell(&mut self, done: u64, total: u64) -> PyResult<()> {
         if done <= self.told {
             return Ok(());
@@ -64,7 +64,7 @@ impl<'py> Progress<'py> {
     }
 }
 
-/// What the threads of long work and the thread that waits for it tell each other.
+/// State shared by the threads of long work and the thread that waits for it.
 #[derive(Default)]
 pub struct Signals {
     stop: AtomicBool,
@@ -103,8 +103,8 @@ impl antumbra_bake::Monitor for Signals {
     }
 }
 
-/// Does work in a pool, without the lock of the interpreter. Meanwhile the thread of the caller looks for signals and tells
-/// of progress. An exception of either stops the work, and is raised when it has ended.
+/// Does work in a pool, without the lock of the interpreter. Meanwhile the thread of the caller looks for signals and reports
+/// progress. An exception of either stops the work, and is raised when it has ended.
 pub fn watch<T: Send>(
     py: Python<'_>,
     threads: &Threads,

@@ -38,8 +38,8 @@ pub struct ChildOrder(antumbra::ChildOrder);
 
 /// Objects that are built once, placed by instances that move.
 ///
-/// Each mesh is an object with a tree of its own. ``set_instances`` makes only the few nodes above them again. Answers are those of a
-/// ``Scene`` with these instances, bit for bit; the tree of a Scene is faster where nothing moves.
+/// Each mesh is an object with a tree of its own. ``set_instances`` makes only the few nodes above them again. A ``Scene``
+/// with these instances has the same answers, bit for bit, and a tree that is faster where nothing moves.
 ///
 /// A query that runs while another thread moves the world answers for the world as it was when the query began. Hits keep the places
 /// that they have.
@@ -53,7 +53,7 @@ pub struct ChildOrder(antumbra::ChildOrder);
 /// objects : int or array (k,) of integers, optional
 ///     Mesh that each instance places. Not needed for one mesh.
 /// ground : as ``meshes``, optional
-///     Meshes that stand in the world themselves. In ``hits.mesh`` they come behind ``meshes``.
+///     Meshes of the world itself, without an instance. In ``hits.mesh`` they come behind ``meshes``.
 /// origin : "auto" or (3,), optional
 ///     As for ``Scene``. Instances that move far away from it are rounded more.
 /// quality : "default" or "fast"

@@ -32,7 +32,7 @@ class SunPositions(NamedTuple):
 
     @property
     def up(self) -> NDArray[np.bool_]:
-        """Whether the sun stands above the horizon."""
+        """Whether the sun is above the horizon."""
         above: NDArray[np.bool_] = self.elevation > 0
         return above
 
@@ -48,7 +48,7 @@ def sun_positions(
     up: Literal["y", "z"] = "z",
     north: float = 0.0,
 ) -> SunPositions:
-    """Where the sun stands at a place, by the solar position algorithm of NREL.
+    """Where the sun is at a place, by the solar position algorithm of NREL.
 
     Parameters
     ----------
