@@ -222,7 +222,7 @@ pub enum Command {
     ///
     /// Suns are where the algorithm of NREL has them. Light that surfaces reflect is left out.
     #[command(override_usage = "antumbra sun [OPTIONS] -o <OUT> <SENSORS> <SCENE>")]
-    Sun(SunArgs),
+    Sun(Box<SunArgs>),
     /// Find which points see each other, and what observers see
     ///
     /// Points see each other if nothing lies between them. With --viewshed, the result is how many points of

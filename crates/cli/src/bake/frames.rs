@@ -74,7 +74,7 @@ impl Baked<'_> {
             for (index, &step) in steps.iter().enumerate() {
                 interrupt::check()?;
                 let pixels = draw(step)?.pixels().map_err(Failure::work)?;
-                pixels.write(&numbered(path, index + 1))?;
+                pixels.write(numbered(path, index + 1))?;
             }
             return Ok(());
         }
