@@ -172,7 +172,7 @@ mod tests {
         let mut options = gif::DecodeOptions::new();
         options.set_color_output(gif::ColorOutput::RGBA);
         let mut decoder = options.read_info(&bytes[..]).expect("a file");
-        let mut shown = vec![[0; 3]; 4];
+        let mut shown = [[0; 3]; 4];
         for wanted in &pictures {
             let frame = decoder
                 .read_next_frame()
