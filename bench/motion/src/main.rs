@@ -58,8 +58,6 @@ fn run(name: &str, scene: &MovingScene<'_>, bvh: &MovingBvh, embree: &Embree) {
     let mut expected = vec![false; rays.len()];
     embree.occluded(rays, times, &mut expected);
     let hits = expected.iter().filter(|&&hit| hit).count();
-    let mut distances = vec![0.0; rays.len()];
-    embree.intersect(rays, times, &mut distances);
     println!("{name}: {} % occluded", 100 * hits / rays.len());
     type Ask<'a> = Box<dyn Fn(&[Ray], &mut [f32]) + 'a>;
     let shadows = |ask: &dyn Fn(&mut [bool]), found: &mut [f32]| {

@@ -149,6 +149,13 @@ pub enum Error {
         /// Index of the instance.
         inst_id: u32,
     },
+    /// A scene that moves got another number of trees than it has spans between two keys.
+    OtherTrees {
+        /// Spans of the scene.
+        expected: usize,
+        /// Trees that were found.
+        found: usize,
+    },
     /// A build was stopped by its [monitor](crate::BuildMonitor).
     Cancelled,
     /// A refit got another number of sound primitives than the tree was built over.
@@ -291,6 +298,10 @@ impl fmt::Display for Error {
             Self::OutOfRange { inst_id } => write!(
                 f,
                 "the path of instance {inst_id} leaves the range of single precision"
+            ),
+            Self::OtherTrees { expected, found } => write!(
+                f,
+                "a scene that moves needs one tree per span between two keys, {expected} in all, but got {found}"
             ),
             Self::Cancelled => write!(f, "the build was cancelled"),
             Self::OtherPrimitives { expected, found } => write!(

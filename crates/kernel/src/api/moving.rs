@@ -10,7 +10,6 @@ use antumbra_simd::{Dispatch, Isa};
 use super::batch::CHUNK;
 use super::build::Build;
 use super::bvh::Bvh;
-use super::query::FEW;
 use super::recipe::Recipe;
 use crate::aabb::Aabb;
 use crate::error::Error;
@@ -34,6 +33,10 @@ use crate::tree::motion::Keys;
 /// Times go from 0, the first key, to 1, the last one. Times outside are clamped, and NaN counts as 0. An answer at a
 /// time equals the answer of [`Brute`](crate::Brute) over [`MovingScene::at`] that time, for every recipe, width and
 /// level, for single rays and in batches.
+///
+/// Two exceptions are known, both from the clamping of distances into boxes. In an object squeezed by a factor of
+/// thousands, the distance of a hit at a grazing angle may differ, because the box around a moving instance is larger than
+/// needed. Distances of user geometry may differ that are not inside its own box.
 ///
 /// Each span between two keys has a tree of its own, which is built and learned in the middle of the span. Boxes
 /// move along: a node tests where its boxes are at the time of the ray. Objects are stored once for every span.
@@ -98,16 +101,14 @@ impl MovingBvh {
     /// was built. `motion` belongs to the scene.
     ///
     /// # Errors
-    /// [`Error::OtherKeys`] if there are not as many trees as spans; [`Error::PrimitiveIsGone`] if a triangle of a
+    /// [`Error::OtherTrees`] if there are not as many trees as spans; [`Error::PrimitiveIsGone`] if a triangle of a
     /// moving mesh is not where it is in the middle of the span, as in a tree of another scene or span. Other
     /// primitives are not compared.
     pub fn from_trees(motion: &Motion, trees: Vec<Bvh>) -> Result<Self, Error> {
         if trees.len() != motion.spans.len() {
-            return Err(Error::OtherKeys {
-                what: "list of trees",
-                id: 0,
-                expected: motion.spans.len() + 1,
-                found: trees.len() + 1,
+            return Err(Error::OtherTrees {
+                expected: motion.spans.len(),
+                found: trees.len(),
             });
         }
         let mut spans = Vec::with_capacity(trees.len());
@@ -176,10 +177,10 @@ impl MovingBvh {
         self.batch::<Closest>(rays, times, hits);
     }
 
-    /// Checks every promise of the trees that traversal relies on, at both keys of every span; for tests and bug reports.
+    /// Checks that the boxes of the world hold what is below them, at both keys of every span; for tests and bug reports.
     ///
     /// # Errors
-    /// The first broken promise, in words.
+    /// The first box that does not, in words.
     pub fn validate(&self) -> Result<(), alloc::string::String> {
         self.spans
             .iter()
@@ -288,7 +289,7 @@ impl Bvh {
     ) {
         self.pool.with(|memory: &mut Memory| {
             let batch = &RayBatch::new(rays, 0).at(shares);
-            if rays.len() >= FEW && self.is_worth_a_stream(rays.len()) {
+            if self.is_worth_a_stream(rays.len()) {
                 let mut pending = core::mem::take(&mut memory.pending);
                 pending.clear();
                 pending.extend(0..rays.len() as u32);
@@ -305,7 +306,7 @@ impl Bvh {
     }
 }
 
-/// What moves in a scene, made ready for trees: see [`MovingBvh::from_trees`].
+/// Meshes and instances of a scene that move, prepared for trees: see [`MovingBvh::from_trees`].
 ///
 /// Keeps copies of the keys, and none of what does not move.
 ///
@@ -341,7 +342,7 @@ struct MeshSpan {
 }
 
 impl Motion {
-    /// What moves in a scene.
+    /// Prepares the meshes and instances of a scene that move.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for an instance whose path leaves the range of `f32`; as [`Primitives::new`] for objects
@@ -388,8 +389,8 @@ impl Motion {
         let mut all = Aabb::EMPTY;
         for span in &self.spans {
             for mesh in span.meshes.iter().flatten() {
-                for position in mesh.positions.iter().flat_map(|key| key.iter()) {
-                    all = all.union(&Aabb::around(&[*position]));
+                for key in &mesh.positions {
+                    all = all.union(&Aabb::around(key));
                 }
             }
             for placement in span.placements.iter().flatten() {
@@ -409,7 +410,7 @@ impl fmt::Debug for Motion {
     }
 }
 
-/// All keys of a mesh.
+/// All keys of a mesh that moves.
 struct MeshKeys {
     keys: Vec<Arc<[[f32; 3]]>>,
     indices: Arc<[[u32; 3]]>,
@@ -417,19 +418,18 @@ struct MeshKeys {
 
 fn of_mesh(geometry: &MovingGeometry<'_>) -> Option<MeshKeys> {
     match geometry {
-        MovingGeometry::Still(_) => None,
-        MovingGeometry::Mesh(mesh) => Some(MeshKeys {
+        MovingGeometry::Mesh(mesh) if mesh.keys.len() > 1 => Some(MeshKeys {
             keys: mesh.keys.iter().map(|key| Arc::from(&key[..])).collect(),
             indices: Arc::from(&mesh.indices[..]),
         }),
+        _ => None,
     }
 }
 
 impl MeshKeys {
     fn span(&self, span: usize) -> MeshSpan {
-        let key = |key: usize| Arc::clone(&self.keys[key.min(self.keys.len() - 1)]);
         MeshSpan {
-            positions: [key(span), key(span + 1)],
+            positions: [span, span + 1].map(|key| Arc::clone(&self.keys[key])),
             indices: Arc::clone(&self.indices),
         }
     }

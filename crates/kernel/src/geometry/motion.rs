@@ -70,9 +70,7 @@ impl<'a> MovingMesh<'a> {
         };
         let end = self.keys.get(span + 1).unwrap_or(start);
         (start.iter().enumerate())
-            .map(|(vertex, at)| {
-                core::array::from_fn(|axis| between(at[axis], end[vertex][axis], share))
-            })
+            .map(|(vertex, at)| between(at, &end[vertex], share))
             .collect()
     }
 
@@ -125,7 +123,7 @@ impl<'a> MovingMesh<'a> {
     fn middle(&self, span: usize) -> Geometry<'static> {
         let [start, end] = self.span(span);
         let mut positions: Vec<[f32; 3]> = (start.iter().zip(end))
-            .map(|(a, b)| core::array::from_fn(|axis| between(a[axis], b[axis], 0.5)))
+            .map(|(a, b)| between(a, b, 0.5))
             .collect();
         let mut indices = self.indices.to_vec();
         for triangle in &mut indices {
@@ -182,12 +180,10 @@ impl MovingInstance {
     /// [`Error::KeyTransform`] if a key beside that time has a number that is not finite or no inverse, and [`Error::KeysMirror`] if one
     /// mirrors and the other does not, both with 0 as the instance; [`Error::OtherKeys`] without keys.
     pub fn transform_at(&self, time: f32) -> Result<[[f32; 4]; 3], Error> {
-        check_count(("instance", 0), self.keys.len(), self.keys.len())?;
-        let (span, share) = locate(time, (self.keys.len() - 1).max(1));
-        Ok(match self.path(0, span)? {
-            Some(path) => path.transform(share),
-            None => self.keys[span.min(self.keys.len() - 1)],
-        })
+        let keys = self.keys.len();
+        check_count(("instance", 0), keys, keys.max(2))?;
+        let (span, share) = locate(time, (keys - 1).max(1));
+        Ok(self.placed(0, span, share)?.transform)
     }
 
     /// The path of the instance in a span; `None` if it does not move there.
@@ -264,7 +260,7 @@ impl<'a> From<MovingMesh<'a>> for MovingGeometry<'a> {
 /// assert_eq!((scene.spans(), scene.at(0.5)?.bounds().min[0]), (1, 2.0));
 /// # Ok::<(), antumbra::Error>(())
 /// ```
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct MovingScene<'a> {
     pub(crate) world: Vec<MovingGeometry<'a>>,
     pub(crate) objects: Vec<Vec<Geometry<'a>>>,
@@ -373,7 +369,7 @@ fn check_count(
     found: usize,
     expected: usize,
 ) -> Result<(), Error> {
-    if found == 1 || (found == expected && found > 0) {
+    if found == 1 || found == expected {
         return Ok(());
     }
     Err(Error::OtherKeys {

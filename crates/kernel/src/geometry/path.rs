@@ -21,8 +21,9 @@
 //!
 //! So around the middle `c` of a step of `2 h`, the box of the object at `c`, wider by `h` times that speed, holds the object
 //! at all times of the step. Two planes that are linear in `s`, and beyond the planes of all steps at both of their ends, hold it
-//! at all times. What the rounding of a transform to single precision moves is less than [`ROUNDED`] times the coordinates, and what
-//! the rounding of a plane at a time moves less than [`PLANE`] times the plane. Both are added.
+//! at all times. Two margins are added. Rounding `R S` and `T` to single precision moves `x` by less than [`ROUNDED`] times
+//! `|S| |p| + |T|`, where `|S|` is the Frobenius norm. Rounding a plane at a time moves the plane by less than [`PLANE`]
+//! times its distance from the origin.
 
 use crate::aabb::Aabb;
 use crate::geometry::instance::{Affine, ObjectShape, Placement, cross, dot};
@@ -37,11 +38,11 @@ const PLANE: f64 = 8.0 / (1u64 << 24) as f64;
 /// Angles between quaternions below this, whose sine is no divisor, are none: less than a rounding of `f32`.
 const NO_ANGLE: f64 = 1e-9;
 
-/// Value between two keys, at a share of the way. Three operations, each rounded: the same bits wherever it is computed, and
-/// what does not change stays what it is.
+/// Values between two keys, at a share of the way. Three operations, each rounded: the same bits wherever they are computed,
+/// and a value that does not change keeps its value.
 #[inline(always)]
-pub(crate) fn between(start: f32, end: f32, share: f32) -> f32 {
-    start + share * (end - start)
+pub(crate) fn between<const K: usize>(start: &[f32; K], end: &[f32; K], share: f32) -> [f32; K] {
+    core::array::from_fn(|i| start[i] + share * (end[i] - start[i]))
 }
 
 /// A transform between two keys, as a translation, a rotation and a stretch.
@@ -69,26 +70,23 @@ pub(crate) enum Unfit {
 impl Path {
     /// A path from one transform to another.
     pub fn new(keys: [&[[f32; 4]; 3]; 2]) -> Result<Self, Unfit> {
-        let mut parts = [([0.0; 3], [0.0; 4], [[0.0; 3]; 3], false); 2];
-        for (key, parts) in parts.iter_mut().enumerate() {
-            *parts = taken_apart(keys[key]).ok_or(Unfit::Key(key))?;
-        }
-        let [start, mut end] = parts;
-        if start.3 != end.3 {
+        let parts = |key: usize| Parts::new(keys[key]).ok_or(Unfit::Key(key));
+        let (start, mut end) = (parts(0)?, parts(1)?);
+        if start.mirrors != end.mirrors {
             return Err(Unfit::Mirrors);
         }
-        let mut cosine = dot4(start.1, end.1);
+        let mut cosine = dot4(start.turned, end.turned);
         if cosine < 0.0 {
-            end.1 = end.1.map(|x| -x);
+            end.turned = end.turned.map(|x| -x);
             cosine = -cosine;
         }
         // The sine as well, for angles whose cosine is 1 but for rounding.
-        let across: [f64; 4] = core::array::from_fn(|i| end.1[i] - cosine * start.1[i]);
+        let across: [f64; 4] = core::array::from_fn(|i| end.turned[i] - cosine * start.turned[i]);
         let angle = libm::atan2(math::sqrt(dot4(across, across)), cosine);
         Ok(Self {
-            moved: [start.0, end.0],
-            turned: [start.1, end.1],
-            stretched: [start.2, end.2],
+            moved: [start.moved, end.moved],
+            turned: [start.turned, end.turned],
+            stretched: [start.stretched, end.stretched],
             angle,
             per_sine: 1.0 / sine(angle),
         })
@@ -138,8 +136,12 @@ impl Path {
             });
             lengths.fold(0.0, f64::max)
         };
+        // Of a vector, or the Frobenius norm of a matrix.
+        let length = |rows: &[[f64; 3]]| math::sqrt(rows.iter().map(|row| dot(*row, *row)).sum());
         let [from, to] = self.stretched;
         let change = core::array::from_fn(|row| [0, 1, 2].map(|i| to[row][i] - from[row][i]));
+        let distances = corners.iter().map(|corner| length(&[*corner]));
+        let products = f64::max(length(&from), length(&to)) * distances.fold(0.0, f64::max);
         let radius = f64::max(largest(&from), largest(&to));
         let speed = 2.0 * self.angle * radius + largest(&change);
         let step = 1.0 / STEPS as f64;
@@ -150,7 +152,7 @@ impl Path {
             for axis in 0..3 {
                 let moved = (self.moved[1][axis] - self.moved[0][axis]).abs();
                 let farthest = self.moved.map(|moved| moved[axis].abs());
-                let rounded = ROUNDED * (radius + f64::max(farthest[0], farthest[1]));
+                let rounded = ROUNDED * (products + f64::max(farthest[0], farthest[1]));
                 let wider = 0.5 * step * (moved + speed) + rounded;
                 planes[0][axis] = f64::from(bounds.min[axis]) - wider;
                 planes[1][axis] = f64::from(bounds.max[axis]) + wider;
@@ -224,9 +226,7 @@ impl MovingPlacement {
     #[inline(always)]
     pub fn planes(&self, share: f32) -> [[f32; 4]; 2] {
         let [start, end] = &self.planes;
-        core::array::from_fn(|side| {
-            core::array::from_fn(|axis| between(start[side][axis], end[side][axis], share))
-        })
+        core::array::from_fn(|side| between(&start[side], &end[side], share))
     }
 
     /// The placement at a share of the way, with the box of that time. `None` where the transform has no inverse, which
@@ -243,46 +243,60 @@ impl MovingPlacement {
     }
 }
 
-/// Translation, rotation and stretch of a transform, and whether it mirrors. `None` unless all is finite and has an inverse.
-#[allow(clippy::type_complexity)]
-fn taken_apart(transform: &[[f32; 4]; 3]) -> Option<([f64; 3], [f64; 4], [[f64; 3]; 3], bool)> {
-    if !transform.as_flattened().iter().all(|x| x.is_finite()) {
-        return None;
-    }
-    let affine = Affine::new(transform);
-    affine.inverse()?;
-    let linear = affine.rows.map(|[a, b, c, _]| [a, b, c]);
-    let mirrors = dot(linear[0], affine.cofactors()[0]) < 0.0;
-    let sign = if mirrors { -1.0 } else { 1.0 };
-    // Scaled to about 1, so that nothing overflows; newton's iteration converges from any matrix with an inverse.
-    let size = linear.iter().map(|row| dot(*row, *row)).fold(0.0, f64::max);
-    let scale = sign / math::sqrt(size);
-    let mut turned = linear.map(|row| row.map(|x| x * scale));
-    for _ in 0..100 {
-        let [p, q, r] = turned;
-        let cofactors = [cross(q, r), cross(r, p), cross(p, q)];
-        let per_det = 1.0 / dot(p, cofactors[0]);
-        let next: [[f64; 3]; 3] = core::array::from_fn(|row| {
-            [0, 1, 2].map(|i| 0.5 * (turned[row][i] + cofactors[row][i] * per_det))
-        });
-        let change = (turned.iter().flatten().zip(next.iter().flatten()))
-            .map(|(a, b)| (a - b).abs())
-            .fold(0.0, f64::max);
-        turned = next;
-        if change < 1e-15 {
-            break;
+/// A transform taken apart.
+struct Parts {
+    moved: [f64; 3],
+    /// A unit quaternion, `[w, x, y, z]`.
+    turned: [f64; 4],
+    stretched: [[f64; 3]; 3],
+    mirrors: bool,
+}
+
+impl Parts {
+    /// Translation, rotation and stretch of a transform. `None` unless all is finite and has an inverse.
+    fn new(transform: &[[f32; 4]; 3]) -> Option<Self> {
+        if !transform.as_flattened().iter().all(|x| x.is_finite()) {
+            return None;
         }
-    }
-    // The transposed rotation brings the map back to its stretch.
-    let stretched = core::array::from_fn(|row| {
-        [0, 1, 2].map(|column| {
-            (0..3)
-                .map(|i| turned[i][row] * linear[i][column])
-                .sum::<f64>()
+        let affine = Affine::new(transform);
+        affine.inverse()?;
+        let linear = affine.rows.map(|[a, b, c, _]| [a, b, c]);
+        let mirrors = dot(linear[0], affine.cofactors()[0]) < 0.0;
+        let sign = if mirrors { -1.0 } else { 1.0 };
+        // Scaled to about 1, so that nothing overflows; Newton's iteration converges from any matrix with an inverse.
+        let size = linear.iter().map(|row| dot(*row, *row)).fold(0.0, f64::max);
+        let scale = sign / math::sqrt(size);
+        let mut turned = linear.map(|row| row.map(|x| x * scale));
+        for _ in 0..100 {
+            let [p, q, r] = turned;
+            let cofactors = [cross(q, r), cross(r, p), cross(p, q)];
+            let per_det = 1.0 / dot(p, cofactors[0]);
+            let next: [[f64; 3]; 3] = core::array::from_fn(|row| {
+                [0, 1, 2].map(|i| 0.5 * (turned[row][i] + cofactors[row][i] * per_det))
+            });
+            let change = (turned.iter().flatten().zip(next.iter().flatten()))
+                .map(|(a, b)| (a - b).abs())
+                .fold(0.0, f64::max);
+            turned = next;
+            if change < 1e-15 {
+                break;
+            }
+        }
+        // The transposed rotation brings the map back to its stretch.
+        let stretched = core::array::from_fn(|row| {
+            [0, 1, 2].map(|column| {
+                (0..3)
+                    .map(|i| turned[i][row] * linear[i][column])
+                    .sum::<f64>()
+            })
+        });
+        Some(Self {
+            moved: affine.rows.map(|row| row[3]),
+            turned: quaternion(&turned),
+            stretched,
+            mirrors,
         })
-    });
-    let moved = affine.rows.map(|row| row[3]);
-    Some((moved, quaternion(&turned), stretched, mirrors))
+    }
 }
 
 /// Per term of the series of the sine, one over the next two factors of the factorial.

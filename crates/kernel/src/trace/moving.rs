@@ -14,7 +14,6 @@ use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::triangle::{LanesOf, TriangleBlock, VectorHits};
 use crate::prim_id::PrimId;
-use crate::ray::Ray;
 use crate::trace::condition::Condition;
 use crate::trace::query::{Closest, Occlusion, Query, StreamQuery};
 use crate::trace::ray_batch::RayBatch;
@@ -163,14 +162,6 @@ impl<Q: BlockQuery> Query for Moving<Q> {
         state: Q::IDLE,
         share: 0.0,
     };
-
-    #[inline(always)]
-    fn begin(ray: &Ray) -> Self::State {
-        Timed {
-            state: Q::begin(ray),
-            share: 0.0,
-        }
-    }
 
     #[inline(always)]
     fn begin_in(batch: &RayBatch<'_>, index: usize) -> Self::State {

@@ -256,7 +256,7 @@ impl<const N: usize> WideTree<N> {
             for lane in 0..block.count() {
                 let id = block.id(lane);
                 if let Some([first, last]) = keys.corners(id) {
-                    let middle = corners_between(&first, &last, 0.5);
+                    let middle = [0, 1, 2].map(|i| between(&first[i], &last[i], 0.5));
                     if is_sound(&middle) && middle != block.triangle(lane) {
                         let PrimRef { geom_id, prim_id } = id;
                         return Err(Error::PrimitiveIsGone { geom_id, prim_id });
@@ -293,11 +293,4 @@ fn wider(bounds: &Aabb, by: f32) -> Aabb {
         min: bounds.min.map(|x| (x - by).next_down()),
         max: bounds.max.map(|x| (x + by).next_up()),
     }
-}
-
-/// Corners between two keys.
-fn corners_between(start: &[[f32; 3]; 3], end: &[[f32; 3]; 3], share: f32) -> [[f32; 3]; 3] {
-    core::array::from_fn(|corner| {
-        core::array::from_fn(|axis| between(start[corner][axis], end[corner][axis], share))
-    })
 }

@@ -1,12 +1,14 @@
 //! Scenes that move while rays are traced: every tree against brute force over the scene at the time of the ray.
 
+use std::sync::Arc;
+
 use antumbra::{
     Brute, Bvh, Error, Geometry, Motion, MovingBvh, MovingGeometry, MovingInstance, MovingMesh,
     MovingScene, Ray, Recipe, Sphere, Width,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 
-use super::support::{cases, kernel_rays};
+use super::support::{Stripes, cases, cutouts, kernel_rays, quads};
 use super::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
 
 /// A mesh whose keys are the mesh, moved and bent.
@@ -122,6 +124,22 @@ fn meshes_answer_as_brute_force() {
     assert!(sums[0] > 300 && sums[1] > 300, "{sums:?}");
 }
 
+/// Leaves of these kinds have loops of their own, and never move.
+#[test]
+fn cutouts_and_quads_beside_a_moving_mesh_answer_as_brute_force() {
+    let mut rng = Rng::new(4400);
+    let [shape, veil, walls] = [(); 3].map(|()| mesh::soup(&mut rng, 40));
+    let world = vec![
+        moving_mesh(&mut rng, &shape, 2).into(),
+        cutouts(&veil, Arc::new(Stripes { count: 3.0 })).into(),
+        quads(&walls).into(),
+    ];
+    let scene = MovingScene::new(world, vec![], vec![]).expect("sound");
+    let rays = kernel_rays(&rays::around(&mut rng, &veil, 400));
+    let counts = check(&scene, &mut rng, &rays, "cut-outs");
+    assert!(counts[0] > 20 && counts[1] > 20, "{counts:?}");
+}
+
 /// A random transform and others that it can move to.
 fn path(rng: &mut Rng, keys: usize) -> Vec<Transform> {
     let mut keys_of_path = vec![transform(rng)];
@@ -199,15 +217,23 @@ fn a_moving_square_covers_points_for_as_long_as_it_is_above_them() {
         MovingScene::new(vec![], vec![object], vec![instance]).expect("sound"),
     ] {
         let bvh = MovingBvh::build(&scene, &Recipe::default()).expect("checked");
+        // More rays than one thread takes at a time.
+        const COLUMNS: usize = 30;
         const TIMES: usize = 1000;
-        for column in 0..30 {
-            let x = (column as f32 + 0.5) / 10.0;
-            let rays = vec![Ray::new([x, 0.4, 0.0], [0.0, 0.0, 1.0]); TIMES];
-            let times: Vec<f32> = (0..TIMES)
-                .map(|i| (i as f32 + 0.5) / TIMES as f32)
-                .collect();
-            let mut occluded = vec![false; TIMES];
-            bvh.occluded_batch(&rays, &times, &mut occluded);
+        let x = |column: usize| (column as f32 + 0.5) / 10.0;
+        let rays: Vec<Ray> = (0..COLUMNS * TIMES)
+            .map(|ray| Ray::new([x(ray / TIMES), 0.4, 0.0], [0.0, 0.0, 1.0]))
+            .collect();
+        let times: Vec<f32> = (0..COLUMNS * TIMES)
+            .map(|ray| ((ray % TIMES) as f32 + 0.5) / TIMES as f32)
+            .collect();
+        let mut occluded = vec![false; rays.len()];
+        bvh.occluded_batch(&rays, &times, &mut occluded);
+        for ((ray, time), occluded) in rays.iter().zip(&times).zip(&occluded) {
+            assert_eq!(bvh.occluded(ray, *time), *occluded, "{ray:?} at {time}");
+        }
+        for (column, occluded) in occluded.chunks(TIMES).enumerate() {
+            let x = x(column);
             let covered = occluded.iter().filter(|&&o| o).count() as f32 / TIMES as f32;
             // The square is above x from time (x - 1) / 2 to x / 2.
             let expected = (x / 2.0).min(1.0) - ((x - 1.0) / 2.0).max(0.0);
@@ -219,23 +245,25 @@ fn a_moving_square_covers_points_for_as_long_as_it_is_above_them() {
     }
 }
 
-/// Half a turn: points go around in a circle, not through its middle.
+/// Half a turn: points go around in a circle, not through its middle. Meanwhile the size grows from 1 to 3.
 #[test]
-fn rotations_turn() {
+fn rotations_turn_and_stretches_grow() {
     let turned: Transform = [
         [-1.0, 0.0, 0.0, 0.0],
         [0.0, -1.0, 0.0, 0.0],
         [0.0, 0.0, 1.0, 0.0],
     ];
-    let instance = MovingInstance::new(0, vec![IDENTITY, turned]);
+    let end = product(&turned, &scale([3.0; 3]));
+    let instance = MovingInstance::new(0, vec![IDENTITY, end]);
     for step in 0..=16 {
         let time = step as f32 / 16.0;
         let [row, other, _] = instance.transform_at(time).expect("sound");
         let angle = std::f32::consts::PI * time;
-        let expected = [angle.cos(), angle.sin().abs()];
-        assert!((row[0] - expected[0]).abs() < 1e-6, "{time}: {row:?}");
+        let size = 1.0 + 2.0 * time;
+        let expected = [size * angle.cos(), size * angle.sin().abs()];
+        assert!((row[0] - expected[0]).abs() < 2e-6, "{time}: {row:?}");
         assert!(
-            (other[0].abs() - expected[1]).abs() < 1e-6,
+            (other[0].abs() - expected[1]).abs() < 2e-6,
             "{time}: {other:?}"
         );
     }
@@ -396,6 +424,9 @@ fn trees_of_another_scene_are_refused() {
     assert!(matches!(other.err(), Some(Error::PrimitiveIsGone { .. })));
     assert!(matches!(
         MovingBvh::from_trees(&motion(1.0), vec![]).err(),
-        Some(Error::OtherKeys { .. })
+        Some(Error::OtherTrees {
+            expected: 1,
+            found: 0
+        })
     ));
 }
