@@ -1,5 +1,8 @@
 //! Intel Open Image Denoise 2, loaded at run time. All `unsafe` of denoising is here.
 //!
+//! `unsafe` is needed because functions of a C library that is loaded at run time are called: the compiler sees neither their
+//! signatures nor what they do with pointers.
+//!
 //! Nothing of the library is needed to build or to run the program. The functions used are looked up in the shared library
 //! by name. Their signatures follow the header `OpenImageDenoise/oidn.h` of versions 2.0 to 2.5. The library is
 //! never unloaded: threads of its task scheduler may still be running in it.
@@ -57,11 +60,11 @@ macro_rules! functions {
         }
 
         impl Functions {
-            fn find(library: &Shared) -> Result<Self, &'static str> {
+            fn find(library: &'static Shared) -> Result<Self, &'static str> {
                 Ok(Self {
                     $($field: {
-                        // SAFETY: version 2 exports a function of this signature by this name. `oidnSetFilterBool`,
-                        // which version 1 lacks, is among them.
+                        // SAFETY: version 2 exports a function of this signature by this name, as its header declares.
+                        // Version 1 is refused, because it lacks `oidnSetFilterBool`. The library is never unloaded.
                         let symbol = unsafe { library.get(concat!($name, "\0").as_bytes()) };
                         *symbol.map_err(|_| $name)?
                     },)*
@@ -117,10 +120,11 @@ impl Library {
         let named = named.or_else(|| env::var_os("OIDN_LIBRARY").map(PathBuf::from));
         let mut reason = String::new();
         for file in candidates(named.as_deref()) {
-            // SAFETY: loading runs the initializers of the library, which the user named or installed.
+            // SAFETY: loading runs the initializers of a C library, which cannot be checked. It is the library that the
+            // user named or installed.
             match unsafe { Shared::new(&file) } {
                 Ok(library) => {
-                    // Never unloaded.
+                    // Never unloaded: pointers to its functions are kept.
                     let library: &'static Shared = Box::leak(Box::new(library));
                     let found = Functions::find(library);
                     let functions = found.map_err(|function| Error::Version {
@@ -165,8 +169,9 @@ impl Library {
         let mut output = vec![[0.0; 3]; expected];
         let functions = &self.functions;
         let set = |filter: Handle, name: &CStr, values: *mut [f32; 3]| {
-            // SAFETY: the filter exists, and `values` has `width * height` elements of three floats, which outlive it.
-            // The library writes to the output alone.
+            // SAFETY: a function of the loaded library, with the signature of its header. The filter exists. `values` has
+            // `width * height` elements of three floats, as checked above, and outlives the filter. The library writes
+            // only to the output.
             unsafe {
                 (functions.set_image)(
                     filter,
@@ -181,7 +186,8 @@ impl Library {
                 );
             }
         };
-        // SAFETY: handles are used only while they exist, and are released once.
+        // SAFETY: functions of the loaded library, with the signatures of its header. Handles are not null, as checked here,
+        // are used only while they exist, and are released once.
         unsafe {
             let device = (functions.new_device)(CPU);
             if device.is_null() {
@@ -217,7 +223,8 @@ impl Library {
     /// The device exists or is null.
     unsafe fn error(&self, device: Handle) -> Option<String> {
         let mut message = std::ptr::null();
-        // SAFETY: as the caller promises. The message is null or a string, which lives until the next call.
+        // SAFETY: a function of the loaded library, with the signature of its header. The caller promises that the device
+        // exists or is null. The message is null or a string, which lives until the next call.
         unsafe {
             let code = (self.functions.device_error)(device, &raw mut message);
             (code != 0).then(|| match message.is_null() {
@@ -232,7 +239,7 @@ impl Library {
     /// # Safety
     /// As [`Self::error`].
     unsafe fn reason(&self, device: Handle, otherwise: &str) -> String {
-        // SAFETY: as the caller promises.
+        // SAFETY: the caller promises that the device exists or is null.
         let error = unsafe { self.error(device) };
         error.unwrap_or_else(|| format!("the library {otherwise}, and gives no reason"))
     }

@@ -32,7 +32,7 @@
 //! - `rays/`, `trees`: rays of camera paths, and trees of any builder, collapse and order
 //! - `gain`: how much faster one tree is than another
 //! - `probe/`: what goes beyond a static order, tried on held-out rays
-//! - `watch`, `error`: progress, interruption, failure
+//! - `still`: scenes whose rays need no time;  `watch`, `error`: progress, interruption, failure
 //! - `machine`, `table`, `output`: parts of all results
 // Denied, not forbidden: `bench::embree` calls a C library.
 #![deny(unsafe_code)]
@@ -47,6 +47,7 @@ mod output;
 pub mod probe;
 mod rays;
 mod report;
+mod still;
 pub mod study;
 mod table;
 mod thread_time;

@@ -196,6 +196,8 @@ pub fn set_camera(scene: &mut Scene, look: &LookAt) -> Result<(), Error> {
         matrix.x_axis = -matrix.x_axis;
     }
     scene.camera.world_from_camera = matrix;
+    // The file's camera may move; this one does not.
+    scene.camera.end = None;
     Ok(())
 }
 

@@ -17,20 +17,22 @@ pub(crate) const SUPPORTED: &[&str] = &["environment", "orthographic", "perspect
 /// Cameras of pbrt-v3 that are not supported.
 pub(crate) const UNSUPPORTED: &[&str] = &["realistic"];
 
-/// Handles `Camera`. Returns the camera, which is measured from `origin`, and, in double precision, camera to world space.
+/// Handles `Camera`. Returns the camera, which is measured from `origin`, and, in double precision, camera to world space at
+/// the start and at the end of the exposure.
 pub(crate) fn declare(
     at: Span,
     kind: &Quoted,
     params: &Params,
     (transforms, origin): (&Transforms, DVec3),
     report: &mut Report,
-) -> (Camera, DMat4) {
+) -> (Camera, [DMat4; 2]) {
     let mut lookup = Lookup::new(at, format!("camera {:?}", kind.text), params);
-    let (matrix, world_from_camera) = world_from_camera_of(at, transforms.start, origin, report);
+    let (matrix, start) = world_from_camera_of(at, transforms.start, origin, report);
+    let mut places = [start; 2];
     let mut end = None;
     if transforms.is_animated() {
-        let (matrix, _) = world_from_camera_of(at, transforms.end, origin, report);
-        end = Some(matrix);
+        let (moved, place) = world_from_camera_of(at, transforms.end, origin, report);
+        places[1] = place;
         if transforms.mirror_differently() {
             report.error_help(at, MIRRORS, MIRRORS_HELP);
         } else if [transforms.start, transforms.end]
@@ -38,6 +40,8 @@ pub(crate) fn declare(
             .any(|matrix| matrix.row(3) != DVec4::W)
         {
             report.unsupported(at, "a moving camera under a perspective transformation is");
+        } else {
+            end = (moved != matrix).then_some(moved);
         }
     }
     let mut camera = Camera::default();
@@ -82,10 +86,10 @@ pub(crate) fn declare(
     lookup.finish(report);
     camera.world_from_camera = matrix;
     camera.end = end;
-    (camera, world_from_camera)
+    (camera, places)
 }
 
-/// Camera to world space, measured from `origin` and in single precision, and as the file has it in double precision.
+/// Camera to world space, twice: in single precision, measured from `origin`, and in double precision, as in the file.
 fn world_from_camera_of(
     at: Span,
     camera_from_world: DMat4,
@@ -146,7 +150,7 @@ fn plane(lookup: &mut Lookup, report: &mut Report) -> Camera {
         lookup.float("shutteropen", defaults.shutter[0], report),
         lookup.float("shutterclose", defaults.shutter[1], report),
     ];
-    // In version 4 the film has refused such times.
+    // In version 4 they were refused with the exposure.
     if shutter[1] < shutter[0] && !report.is_version4 {
         report.note(
             lookup.at,

@@ -30,7 +30,7 @@ pub enum Error {
         /// Number of positions.
         positions: usize,
     },
-    /// The scene moves, and somebody else is to answer the queries of its rendering, who does not know their times.
+    /// The scene moves, but its queries are answered without times: by an observer, or in an experiment.
     #[error(
         "the scene moves while the shutter is open, which this command does not support; `render` does"
     )]
@@ -64,7 +64,7 @@ pub enum Error {
     Interior {
         /// Index of the material.
         index: usize,
-        /// What is wrong.
+        /// Description of the mistake.
         reason: &'static str,
     },
     /// A participating medium cannot be used.
@@ -72,7 +72,7 @@ pub enum Error {
     Medium {
         /// Index of the medium.
         index: usize,
-        /// What is wrong.
+        /// Description of the mistake.
         reason: &'static str,
     },
     /// A shape or the camera names a medium that does not exist.
@@ -88,7 +88,7 @@ pub enum Error {
     Table {
         /// Name of the table.
         name: String,
-        /// What is wrong with it.
+        /// Description of the mistake.
         reason: String,
     },
     /// The kernel refused the geometry.

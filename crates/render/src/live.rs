@@ -230,7 +230,7 @@ mod tests {
         assert_eq!(corners, [16, 32]);
     }
 
-    /// What a viewer reads last is what was published last, whatever happens in between.
+    /// A viewer's last read returns the last published state, whatever happens in between.
     #[test]
     fn no_change_is_lost_between_threads() {
         let live = LiveTiles::new(&film());

@@ -11,10 +11,10 @@ use serde::Serialize;
 pub struct Camera {
     /// Camera space to world space.
     pub world_from_camera: Mat4,
-    /// Camera space to world space at time 1, if the camera moves; `world_from_camera` is then its place at time 0. Between, it moves
-    /// as an [`Instance`](crate::Instance) does.
+    /// Camera space to world space at time 1, if the camera moves. `world_from_camera` is then its place at time 0. Between,
+    /// the camera moves as an [`Instance`](crate::Instance) does.
     pub end: Option<Mat4>,
-    /// Times at which the shutter opens and closes. Times before 0 and after 1 see what there is at 0 and 1.
+    /// Times at which the shutter opens and closes. Times before 0 count as 0, and times after 1 as 1.
     pub shutter: [f32; 2],
     /// How directions become points of the picture.
     pub projection: Projection,

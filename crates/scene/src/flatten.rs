@@ -63,7 +63,7 @@ impl fmt::Display for Error {
             ),
             Self::Moves { instance } => write!(
                 f,
-                "instance {instance} moves while the shutter is open; flattened scenes stand still"
+                "instance {instance} moves while the shutter is open; a flattened scene cannot move"
             ),
             Self::TooLarge {
                 triangles,

@@ -33,10 +33,10 @@ pub struct FourierTable {
 }
 
 impl FourierTable {
-    /// What is wrong with the table, if anything is.
+    /// Checks that the table does not contradict itself.
     ///
     /// # Errors
-    /// In words, without the name.
+    /// Description of the mistake, without the name of the table.
     pub fn check(&self) -> Result<(), String> {
         let count = self.cosines.len();
         let pairs = count.checked_mul(count);

@@ -31,9 +31,9 @@ pub struct Instance {
     /// Space of the object to world space. Readers guarantee an inverse. An instance without one is flat or a point,
     /// and rays miss it.
     pub world_from_object: Affine3,
-    /// The same at time 1, if the instance moves; `world_from_object` is then its place at time 0. Between, the translation
-    /// moves in a straight line, the rotation turns about one axis, and the stretch changes linearly. Either both
-    /// transformations mirror or none does.
+    /// Space of the object to world space at time 1, if the instance moves. `world_from_object` is then its place at time 0.
+    /// Between, the translation moves in a straight line, the rotation turns about one axis, and the stretch changes
+    /// linearly. Either both transformations mirror or none does.
     pub end: Option<Affine3>,
 }
 

@@ -164,7 +164,7 @@ pub enum Material {
         roughness: [Param<f32>; 2],
         /// True if `roughness` is in 0..=1 and is mapped to a microfacet alpha, false if it is an alpha.
         remap_roughness: bool,
-        /// What is inside.
+        /// Inside of the body.
         interior: Interior,
         /// Mean cosine of the scattering angle, in (-1, 1).
         asymmetry: f32,

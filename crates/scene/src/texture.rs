@@ -106,7 +106,7 @@ pub enum Texture<T> {
     Dither(Param<f32>),
 }
 
-/// What is made of noise.
+/// Pattern that is made of noise.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub enum NoisePattern {
     /// Sum of octaves: fractional Brownian motion ("fbm").

@@ -58,6 +58,7 @@ impl Look {
         let good = matrix.is_finite() && self.fov > 0.1 && self.fov < 170.0;
         good.then(|| Camera {
             world_from_camera: matrix,
+            end: None,
             fov: self.fov,
             ..own.clone()
         })

@@ -30,10 +30,11 @@ use std::path::Path;
 
 use antumbra::recipe::{Builder, Collapse, Order};
 use antumbra::{Brute, Isa, Primitives, Ray, Recipe, Width};
-use antumbra_render::{Lowered, World};
+use antumbra_render::Lowered;
 use antumbra_scene::Scene;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use crate::still::still_world;
 use crate::watch::{self, Watcher};
 use crate::{Caller, Error, Machine, Rays, Table, collect_rays};
 use embree::Device;
@@ -307,8 +308,7 @@ struct Subject<'s> {
 impl<'s> Subject<'s> {
     /// Takes a prepared scene apart: into what can be hit, and the rays of its camera paths.
     fn new(scene: &'s Scene, options: &Options, watcher: &dyn Watcher) -> Result<Self, Error> {
-        let world = World::with_builder(scene, Builder::default());
-        let world = world.map_err(Error::scene(&scene.name))?;
+        let world = still_world(scene, Builder::default())?;
         watch::check(watcher)?;
         let isa = Isa::best();
         let bvh = world.bvh(Width::auto(isa.level()), isa);

@@ -23,6 +23,7 @@ use antumbra::{Isa, Recipe, Width};
 use antumbra_render::World;
 use antumbra_scene::Scene;
 
+use crate::still::still_world;
 use crate::study::Kind;
 use crate::watch;
 use crate::{Error, RaysFrom, TrainedTree, Watcher};
@@ -101,7 +102,7 @@ pub fn run(
         watch::check(watcher)?;
         let name = scene.name.clone();
         watcher.begin(&name);
-        let world = World::with_builder(&scene, Builder::BinnedSah).map_err(Error::scene(&name))?;
+        let world = still_world(&scene, Builder::BinnedSah)?;
         let recipe = Recipe::default()
             .isa(options.isa)
             .width(options.width)

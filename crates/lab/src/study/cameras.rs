@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use antumbra_scene::{Camera, Scene};
-use glam::{DMat3, DMat4, DVec3};
+use glam::{DMat3, DMat4, DVec3, Mat4};
 
 use crate::Error;
 
@@ -44,6 +44,7 @@ impl Viewpoint {
                 }
                 Ok(Camera {
                     world_from_camera: matrix.as_mat4(),
+                    end: None,
                     ..own.clone()
                 })
             }
@@ -67,9 +68,10 @@ fn look_at(numbers: &[f64; 9]) -> Result<DMat4, Error> {
 
 /// A camera at the same place, looking the other way.
 pub fn turned(camera: &Camera) -> Camera {
-    let turn = DMat4::from_rotation_y(PI);
+    let turn = |matrix: Mat4| (matrix.as_dmat4() * DMat4::from_rotation_y(PI)).as_mat4();
     Camera {
-        world_from_camera: (camera.world_from_camera.as_dmat4() * turn).as_mat4(),
+        world_from_camera: turn(camera.world_from_camera),
+        end: camera.end.map(turn),
         ..camera.clone()
     }
 }

@@ -23,9 +23,9 @@ use std::collections::HashMap;
 
 use antumbra::Recipe;
 use antumbra_load::file_stem;
-use antumbra_render::World;
 use antumbra_scene::Scene;
 
+use crate::still::still_world;
 use crate::watch::{self, Step, Watcher, Work};
 use crate::{Error, output};
 
@@ -211,8 +211,7 @@ impl<'a> Study<'a> {
         let subject = &plan.scenes[place];
         let name = &subject.scene.name;
         self.watcher.begin(name);
-        let world = World::with_builder(&subject.scene, plan.base().0);
-        let world = world.map_err(Error::scene(name))?;
+        let world = still_world(&subject.scene, plan.base().0)?;
         watch::check(self.watcher)?;
         let mut bench = Bench::new(plan, subject, &world);
         self.log_rays.insert(&subject.stem, bench.log_rays);

@@ -25,13 +25,10 @@ impl Builder<'_> {
         self.film.scale *= self.exposure;
         // Limits are on values as the sensor has them, scales come after.
         self.film.max_sample_luminance /= self.film.scale;
-        let mut shapes = self.shapes.iter();
         let passes = |shape: &Shape| {
             shape.media.is_some() || matches!(self.materials[shape.material], Material::None)
         };
-        let mut of_objects = self.objects.iter().flat_map(|object| &object.shapes);
-        let is_clear =
-            self.camera.medium.is_none() && !shapes.any(passes) && !of_objects.any(passes);
+        let is_clear = self.camera.medium.is_none() && !self.all_shapes().any(passes);
         if let Integrator::VolumePath {
             max_depth,
             rr_threshold,

@@ -1,6 +1,6 @@
 //! Media by name, and those on the two sides of shapes.
 
-use antumbra_scene::{Medium, MediumInterface};
+use antumbra_scene::{Integrator, Medium, MediumInterface};
 
 use super::Builder;
 use crate::directive::Quoted;
@@ -23,6 +23,12 @@ impl Builder<'_> {
             self.media_indices.entry(name.text).or_insert(0);
             return;
         };
+        if medium.density.is_some() && self.state.now.transforms.is_animated() {
+            report.note(
+                at,
+                "media do not move: the transformation at the start is taken",
+            );
+        }
         let cells = medium.density.as_ref().map_or(0, |grid| grid.values.len());
         let bytes = size_of::<Medium>() as u64 + size_of::<f32>() as u64 * cells as u64;
         if self.budget.take(bytes, at, report) {
@@ -56,5 +62,15 @@ impl Builder<'_> {
             );
         }
         found
+    }
+
+    /// Says where the integrator does not know media. They are left out then, as in pbrt-v3.
+    pub(super) fn check_media(&self, end: Span, report: &mut Report) {
+        let mut shapes = self.all_shapes();
+        let has_media = self.camera.medium.is_some() || shapes.any(|shape| shape.media.is_some());
+        if has_media && !matches!(self.integrator, Integrator::VolumePath { .. }) {
+            let message = "participating media are left out: only volpath, bdpt and mlt know them";
+            report.note(end, message);
+        }
     }
 }

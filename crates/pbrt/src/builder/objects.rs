@@ -1,15 +1,18 @@
 //! Objects and their instances.
 
-use antumbra_scene::{Instance, Object};
+use antumbra_scene::{Instance, Object, Shape};
 use glam::{Affine3, DVec4};
 
-use super::{Builder, ELLIPSOID, SINGULAR, SINGULAR_HELP};
+use super::{Builder, SINGULAR, SINGULAR_HELP};
 use crate::directive::Quoted;
 use crate::report::Report;
 use crate::source::Span;
-use crate::state::BlockKind;
-use crate::state::{MIRRORS, MIRRORS_HELP};
+use crate::state::{BlockKind, MIRRORS, MIRRORS_HELP};
 use crate::{suggest, transform};
+
+/// Feature name for [`Report::unsupported`]: an instance that would turn a sphere into an ellipsoid.
+const ELLIPSOID: &str =
+    "an instance of a sphere under a scale that differs by axis (an ellipsoid) is";
 
 impl Builder<'_> {
     pub(super) fn object_begin(&mut self, at: Span, name: Quoted, report: &mut Report) {
@@ -58,7 +61,7 @@ impl Builder<'_> {
         }
     }
 
-    /// An instance under the current transformations; `None` after a mistake.
+    /// Instance under the current transformations. `None`: a mistake was reported.
     pub(super) fn instance(
         &self,
         at: Span,
@@ -93,7 +96,27 @@ impl Builder<'_> {
         Some(Instance {
             object,
             world_from_object,
-            end: transforms.is_animated().then_some(end),
+            // Differences that single precision does not show are no motion.
+            end: (end != world_from_object).then_some(end),
         })
+    }
+
+    /// Shapes of the world, then the shapes of every object.
+    pub(super) fn all_shapes(&self) -> impl Iterator<Item = &Shape> {
+        let of_objects = self.objects.iter().flat_map(|object| &object.shapes);
+        self.shapes.iter().chain(of_objects)
+    }
+
+    /// Removes the shapes of objects without instances.
+    pub(super) fn drop_unused_objects(&mut self) {
+        let mut is_used = vec![false; self.objects.len()];
+        for instance in &self.instances {
+            is_used[instance.object] = true;
+        }
+        for (object, is_used) in self.objects.iter_mut().zip(is_used) {
+            if !is_used {
+                object.shapes = Vec::new();
+            }
+        }
     }
 }

@@ -81,3 +81,36 @@ fn nothing_moves_where_both_transformations_are_equal() {
     assert!(!scene.moves() && scene.instances.is_empty());
     assert_eq!(scene.shapes.len(), 1);
 }
+
+/// Shapes that are attached to a camera move with the camera, so they are not blurred in its picture.
+#[test]
+fn the_coordinate_system_of_a_camera_moves_with_the_camera() {
+    let loaded = load_text(&format!(
+        r#"ActiveTransform EndTime Translate -1 0 0 ActiveTransform All Camera "perspective"
+        WorldBegin CoordSysTransform "camera" {TRIANGLE} WorldEnd"#
+    ))
+    .unwrap();
+    let instance = loaded.scene.instances[0];
+    assert_eq!(instance.world_from_object.translation, Vec3::ZERO);
+    assert_eq!(instance.end.map(|end| end.translation), Some(Vec3::X));
+}
+
+#[test]
+fn the_shutter_stays_finite_however_short_the_motion() {
+    let text = r#"TransformTimes 0 1e-300 Camera "perspective" WorldBegin WorldEnd"#;
+    let [open, close] = load_text(text).unwrap().scene.camera.shutter;
+    assert_eq!(open, 0.0);
+    assert!(close > 1.0 && (close - open).is_finite(), "{close}");
+}
+
+/// Media of a shape that moves are as media of other shapes: left out with a note where the integrator knows none.
+#[test]
+fn media_of_shapes_that_move_are_noted() {
+    let loaded = load_text(&format!(
+        r#"Integrator "path" WorldBegin MakeNamedMedium "m" "string type" "homogeneous" MediumInterface "m" ""
+        ActiveTransform EndTime Translate 1 0 0 {TRIANGLE} WorldEnd"#
+    ))
+    .unwrap();
+    let notes: Vec<String> = loaded.notes.iter().map(ToString::to_string).collect();
+    assert!(notes.concat().contains("media are left out"), "{notes:?}");
+}

@@ -69,8 +69,8 @@ pub struct Tracer<'b> {
     occluded: Vec<bool>,
     costs: Vec<Cost>,
     stop: Option<&'b dyn Fn() -> bool>,
-    /// The tree that moves, if there is one, and the times that its rays can have. It answers, and `bvh` only counts and
-    /// learns, where everything is half way.
+    /// The tree that moves, if there is one, and the times that its rays can have. The moving tree answers. `bvh`, in which
+    /// everything is half way, then only counts and learns.
     moving: Option<(&'b MovingBvh, Times)>,
     /// Time of each sample of the batch, from 0 to 1.
     sample_times: Vec<f32>,
@@ -94,7 +94,7 @@ impl<'b> Tracer<'b> {
         }
     }
 
-    /// Has a tree of this world that moves answer, if there is one.
+    /// Queries are answered by a tree of this world that moves, if there is one.
     pub fn moving(mut self, world: &World, moving: Option<&'b MovingBvh>) -> Self {
         self.moving = moving.zip(world.shapes.times());
         self
@@ -160,8 +160,8 @@ impl<'b> Tracer<'b> {
         self.counts.closest += start.elapsed();
     }
 
-    /// Whether each of `rays`, which belong to `samples` of the batch, is occluded, and its cost. No costs unless they are observed;
-    /// where something moves, they are costs of the tree half way.
+    /// Whether each of `rays`, which belong to `samples` of the batch, is occluded, and its cost. There are no costs unless they
+    /// are observed. Where something moves, they are costs of the tree half way.
     pub fn occluded(
         &mut self,
         rays: &[Ray],

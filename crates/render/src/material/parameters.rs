@@ -112,7 +112,7 @@ pub enum Pigment {
     Melanin([Input<f32>; 2]),
 }
 
-/// What is inside of a body.
+/// Inside of a body.
 #[derive(Clone, Debug)]
 pub enum Interior {
     /// Absorption and scattering, and the factor of both.

@@ -135,7 +135,7 @@ impl<'a> Job<'a> {
     /// The tree of the world with its motion; `None` where no instance moves.
     ///
     /// # Errors
-    /// [`Error::Moves`] if somebody else is to answer the queries, who does not know their times.
+    /// [`Error::Moves`] if the scene moves and an observer answers the queries, which does not know their times.
     pub fn moving(&self, bvh: &Bvh, is_observed: bool) -> Result<Option<MovingBvh>, Error> {
         if is_observed && self.world.moves() {
             return Err(Error::Moves);

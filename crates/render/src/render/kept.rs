@@ -63,7 +63,7 @@ impl KeptTree {
         &self.bvh
     }
 
-    /// What the camera sees at a film point, in pixels from the top left corner. `None` if it sees no surface.
+    /// Place that the camera sees at a film point, in pixels from the top left corner. `None` if it sees no surface.
     pub fn seen(&self, world: &World, film: [f32; 2]) -> Option<Sight> {
         let ray = world.camera.ray(film, [0.5; 2]);
         let hit = self.bvh.intersect(&ray)?;

@@ -123,8 +123,10 @@ impl Index<usize> for Shapes {
     }
 }
 
-/// Times of a scene that moves, and ids that carry them: a surface needs to know when it was hit, and its id goes wherever it does.
-/// The number of the instance is in the lower bits of an id, and the time in the others, so times are multiples of a step.
+/// Times of a scene that moves, and ids of instances that carry them, because a surface depends on the time of its hit.
+///
+/// The number of the instance is in the lower bits of an id, and the time in the others. Times are therefore multiples of a
+/// step: about a millionth with up to 4095 instances, and more with more instances.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Times {
     /// Bits of the number of an instance.
@@ -177,7 +179,7 @@ impl Times {
 #[derive(Debug)]
 struct Motion {
     times: Times,
-    /// `None` for those that do not.
+    /// Keys of each instance. `None` for instances that do not move.
     instances: Vec<Option<MovingInstance>>,
 }
 

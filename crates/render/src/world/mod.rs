@@ -159,7 +159,7 @@ impl World {
         Ok(world)
     }
 
-    /// The same scene through another camera, onto another film. Everything else is shared, so this takes no time.
+    /// World of the same scene, seen by another camera onto another film. Everything else is shared, so the call takes no time.
     ///
     /// # Errors
     /// [`Error::FieldOfView`], [`Error::CameraMatrix`], [`Error::NoMedium`], [`Error::EmptyPicture`] or [`Error::FilterRadius`].

@@ -1,0 +1,162 @@
+//! Shapes with their materials.
+
+use std::sync::Arc;
+
+use antumbra_scene::{Geometry, Instance, Material, Object, Param, Shape};
+use glam::{DMat4, DVec3};
+
+use super::{Builder, SINGULAR, SINGULAR_HELP};
+use crate::directive::Quoted;
+use crate::lookup::Lookup;
+use crate::material_key::MaterialKey;
+use crate::params::Params;
+use crate::report::Report;
+use crate::shape::Source;
+use crate::source::Span;
+use crate::texture::Textured;
+use crate::{material, shape, suggest, transform};
+
+impl Builder<'_> {
+    pub(super) fn shape(&mut self, at: Span, kind: &Quoted, params: &Params, report: &mut Report) {
+        let transforms = self.state.now.transforms;
+        let is_of_object = self.state.now.object.is_some();
+        if transforms.is_animated() && is_of_object {
+            report.unsupported(at, "moving shapes within objects are");
+        }
+        // A shape that moves is an object of its own with one instance.
+        let moves = transforms.is_animated() && !is_of_object;
+        // Objects come to the origin by their instances.
+        let is_near = is_of_object || moves || self.options.origin == DVec3::ZERO;
+        let to_world = match is_of_object {
+            true => transforms.start,
+            false if moves => DMat4::IDENTITY,
+            false => self.to_origin(transforms.start),
+        };
+        if !transform::is_invertible(&to_world) {
+            report.error_once(at, SINGULAR, Some(SINGULAR_HELP));
+            return;
+        }
+        // The shape's lookup may fall back on parameters of the material, which must live as long.
+        let current = self.state.now.material.clone();
+        let mut lookup = Lookup::new(at, format!("shape {:?}", kind.text), params);
+        let mut values = Textured {
+            lookup: &mut lookup,
+            state: &self.state,
+            report,
+        };
+        // Where the origin of the scene is for the shape.
+        let middle = match is_near {
+            true => DVec3::ZERO,
+            false => to_world.inverse().transform_point3(DVec3::ZERO),
+        };
+        let read = shape::read(kind, &mut values, &to_world, middle);
+        let material = material::of_shape(current.as_deref(), &mut lookup, &self.state, report);
+        if material::hair::is_hair(&material) {
+            let curve_type = lookup.string("type", report).map(|(name, _)| name);
+            if kind.text != "curve" || curve_type == Some("ribbon") {
+                report.unsupported(
+                    at,
+                    "hair on other shapes than flat and cylindrical curves is",
+                );
+            }
+        }
+        lookup.finish(report);
+        let Some((source, cutouts)) = read else {
+            return;
+        };
+        let area_light = self.state.now.area_light.clone();
+        if moves && area_light.is_some() {
+            report.note(
+                at,
+                "area lights of shapes that move are left out, as in pbrt-v3",
+            );
+        }
+        if is_of_object && area_light.is_some() {
+            report.note(
+                at,
+                "area lights of objects are left out: in pbrt-v3 they light nothing",
+            );
+        }
+        let (geometry, mesh_file) = match source {
+            Source::Here(geometry) => (geometry, None),
+            // The mesh of the file replaces the empty one later.
+            Source::File(file) => (Geometry::Mesh(Arc::default()), Some(file)),
+        };
+        let of_mesh = match &geometry {
+            Geometry::Mesh(mesh) => mesh.bytes(),
+            Geometry::Sphere(_) => 0,
+        };
+        let media = self.media(report);
+        let of_motion = match moves {
+            true => size_of::<Object>() + size_of::<Instance>(),
+            false => 0,
+        };
+        let bytes = (size_of::<Shape>() + of_motion) as u64 + of_mesh;
+        if !self.budget.take(bytes, at, report) {
+            return;
+        }
+        let material = match self.state.now.later_material.clone() {
+            Some(name) => self.later_material(&name),
+            None => self.material_index(material),
+        };
+        let shape = Shape {
+            geometry,
+            material,
+            area_light: area_light.filter(|_| !is_of_object && !moves),
+            media,
+            alpha: cutouts.alpha,
+            shadow_alpha: cutouts.shadow_alpha,
+            reverse_orientation: self.state.now.reverse_orientation,
+            transform_swaps_handedness: transform::swaps_handedness(&to_world),
+        };
+        if shape.area_light.is_some() && matches!(shape.alpha, Some(Param::Constant(_))) {
+            report.unsupported(at, "an invisible light (\"alpha\" 0) is");
+        }
+        if moves {
+            let is_sphere = matches!(shape.geometry, Geometry::Sphere(_));
+            let Some(instance) = self.instance(at, self.objects.len(), is_sphere, report) else {
+                return;
+            };
+            self.objects.push(Object::default());
+            self.instances.push(instance);
+        }
+        // Objects are never nested, so the last one is the open one.
+        let object = (is_of_object || moves).then(|| self.objects.len() - 1);
+        let shapes = match object {
+            Some(object) => &mut self.objects[object].shapes,
+            None => &mut self.shapes,
+        };
+        if let Some(file) = mesh_file {
+            self.pending_meshes.push(object, shapes.len(), file);
+        }
+        shapes.push(shape);
+    }
+
+    pub(super) fn named_material(&mut self, name: &Quoted, report: &mut Report) {
+        self.state.now.later_material = None;
+        match self.state.named_materials.get(&name.text) {
+            Some(spec) => self.state.now.material = Some(Arc::clone(spec)),
+            // Looked up when the file ends.
+            None if self.is_version4 => {
+                self.state.now.later_material = Some(Arc::new(name.clone()));
+            }
+            None => report.tolerated(
+                name.span,
+                format!("no material is named {:?} here", name.text),
+                "the material before it stays",
+                || suggest::help(&name.text, &self.state.named_materials.names()),
+            ),
+        }
+    }
+
+    /// Index of a material in the scene. New materials are added.
+    pub(super) fn material_index(&mut self, material: Material) -> usize {
+        *self
+            .material_indices
+            .entry(MaterialKey::new(&material))
+            .or_insert_with(|| {
+                self.materials.push(material);
+                self.materials.len() - 1
+            })
+    }
+}

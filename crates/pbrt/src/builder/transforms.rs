@@ -1,0 +1,71 @@
+//! The current transformations, and the camera, which takes them.
+
+use glam::DMat4;
+
+use super::Builder;
+use crate::directive::Quoted;
+use crate::params::Params;
+use crate::report::Report;
+use crate::source::Span;
+use crate::state::Transforms;
+use crate::{camera, suggest};
+
+impl Builder<'_> {
+    /// A transformation to the world of the file as one to the scene, which is measured from its origin.
+    pub(super) fn to_origin(&self, mut to_world: DMat4) -> DMat4 {
+        to_world.w_axis -= self.options.origin.extend(0.0) * to_world.w_axis.w;
+        to_world
+    }
+
+    pub(super) fn transforms(&mut self) -> &mut Transforms {
+        &mut self.state.now.transforms
+    }
+
+    pub(super) fn concat(&mut self, matrix: DMat4) {
+        self.transforms().change(|current| current * matrix);
+    }
+
+    pub(super) fn transform_times(&mut self, at: Span, times: [f64; 2], report: &mut Report) {
+        let [start, end] = times;
+        // Also when one is NaN.
+        if !(start < end && (end - start).is_finite()) {
+            let message = format!("the transform times {start} and {end} do not ascend");
+            report.error_help(at, message, "the start must be before the end");
+            return;
+        }
+        self.times = times;
+    }
+
+    pub(super) fn coord_sys_transform(&mut self, name: &Quoted, report: &mut Report) {
+        match self.coordinate_systems.get(&name.text) {
+            Some(system) => {
+                let system = *system;
+                self.transforms().set(system);
+            }
+            None => {
+                if report.is_counted_only() {
+                    return;
+                }
+                let mut known: Vec<&str> =
+                    self.coordinate_systems.keys().map(String::as_str).collect();
+                known.sort_unstable();
+                report.error_help(
+                    name.span,
+                    format!("no coordinate system is named {:?}", name.text),
+                    suggest::help(&name.text, &known),
+                );
+            }
+        }
+    }
+
+    pub(super) fn camera(&mut self, at: Span, kind: &Quoted, params: &Params, report: &mut Report) {
+        let transforms = self.state.now.transforms;
+        let origin = self.options.origin;
+        let (camera, places) = camera::declare(at, kind, params, (&transforms, origin), report);
+        self.camera = camera;
+        if self.is_version4 {
+            self.camera.medium = self.medium(1, report);
+        }
+        self.coordinate_systems.insert("camera".into(), places);
+    }
+}
