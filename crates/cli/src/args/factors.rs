@@ -39,7 +39,7 @@ pub struct FactorArgs {
     #[arg(long, value_name = "AXIS", value_parser = up_axis, help_heading = heading::WORK)]
     pub up: Option<UpAxis>,
     /// Angle from mesh to true north
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, help_heading = heading::WORK)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, value_parser = values::finite, help_heading = heading::WORK)]
     pub north: f64,
     #[command(flatten)]
     pub chunks: ChunkArgs,

@@ -29,7 +29,7 @@ pub struct HorizonArgs {
     #[arg(long, value_name = "N", default_value_t = 36, value_parser = clap::value_parser!(u32).range(1..=3600), help_heading = heading::WORK)]
     pub azimuths: u32,
     /// The first azimuth; north is 0, east 90
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, help_heading = heading::WORK)]
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, value_parser = values::finite, help_heading = heading::WORK)]
     pub first: f64,
     #[command(flatten)]
     pub places: PlaceArgs,
@@ -40,10 +40,11 @@ pub struct HorizonArgs {
 }
 
 impl HorizonArgs {
-    /// Degrees from north through east.
+    /// Degrees from north through east, from 0 to 360.
     pub fn degrees(&self) -> Vec<f64> {
         let step = 360.0 / f64::from(self.azimuths);
-        let degrees = (0..self.azimuths).map(|i| self.first + f64::from(i) * step);
+        let degrees =
+            (0..self.azimuths).map(|i| (self.first + f64::from(i) * step).rem_euclid(360.0));
         degrees.collect()
     }
 }

@@ -53,7 +53,8 @@ pub struct PlaceArgs {
         long,
         value_name = "DEGREES",
         default_value_t = 0.0,
-        allow_negative_numbers = true
+        allow_negative_numbers = true,
+        value_parser = values::finite
     )]
     pub north: f64,
     /// Unit: mm, cm, m, km, in or ft

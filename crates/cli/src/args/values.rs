@@ -283,6 +283,14 @@ pub fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Parses a finite number.
+pub fn finite(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() => Ok(number),
+        _ => Err("it must be a number".into()),
+    }
+}
+
 /// Parses a number that is not negative.
 pub fn from_zero(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use antumbra::{Bvh, Geometry as Triangles, Recipe};
-use antumbra_bake::{Array, Entry, Groups, Orientation, ViewFactorJob};
+use antumbra::Bvh;
+use antumbra_bake::{Array, Entry, Groups, Mesh, Orientation, ViewFactorJob};
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::chunks::{self, PartFile};
 use super::command::{Bake, Head};
 use super::files::{self, Format, field};
-use super::groups;
+use super::{groups, places};
 use crate::args::FactorArgs;
 use crate::exit::{Failure, tell};
 use crate::{interrupt, json};
@@ -119,15 +119,14 @@ pub fn run(
 
 /// Tree of the triangles, surface after surface.
 fn tree(surfaces: &[Vec<[[f32; 3]; 3]>]) -> Result<Bvh, Failure> {
-    let corners: Vec<[f32; 3]> = surfaces.iter().flatten().flatten().copied().collect();
-    let indices: Vec<[u32; 3]> = (0..corners.len() as u32 / 3)
-        .map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner))
-        .collect();
-    let built = Bvh::build(
-        &[Triangles::triangles(&corners[..], &indices[..])],
-        &Recipe::default(),
-    );
-    built.map_err(|error| Failure::work(error.to_string()))
+    let positions: Vec<[f32; 3]> = surfaces.iter().flatten().flatten().copied().collect();
+    let triangles = 0..positions.len() as u32 / 3;
+    let indices = triangles.map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner));
+    places::tree(&Mesh {
+        indices: indices.collect(),
+        positions,
+        ..Mesh::default()
+    })
 }
 
 /// Writes a table or arrays.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use antumbra_bake::{Hourly, Moment};
+use antumbra_bake::{Hourly, Moment, Sunlight};
 use antumbra_image::atomic_write;
 use antumbra_map::{Animation, Drawing, Steps};
 
@@ -10,6 +10,7 @@ use super::map;
 use super::sun::Baked;
 use crate::exit::Failure;
 use crate::interrupt;
+use crate::output::Files;
 
 /// Most maps of a command. A day in steps of a minute has fewer.
 const MOST: usize = 1500;
@@ -21,7 +22,7 @@ const CLASSES: [(&str, [u8; 3]); 2] = [("shadow", [88, 98, 128]), ("sun", [250, 
 const SECONDS: f32 = 0.2;
 
 /// Whether a file of moving shadows is a .gif; otherwise maps are .png.
-pub fn format(path: &Path) -> Result<bool, Failure> {
+pub fn is_gif(path: &Path) -> Result<bool, Failure> {
     let extension = path.extension().unwrap_or_default();
     match ["gif", "png"].map(|known| extension.eq_ignore_ascii_case(known)) {
         [true, _] => Ok(true),
@@ -40,22 +41,39 @@ fn numbered(path: &Path, number: usize) -> PathBuf {
     path.with_file_name(format!("{stem}-{number:04}.png"))
 }
 
+/// Steps of time with a sun, each of which has a map.
+fn steps(hourly: &Hourly<'_>) -> Result<Vec<usize>, Failure> {
+    let steps = (0..hourly.len()).filter(|&step| hourly.sun(step).is_some());
+    let steps: Vec<usize> = steps.collect();
+    if steps.is_empty() || steps.len() > MOST {
+        let found = steps.len();
+        let reason = format!(
+            "--frames: {found} steps of time have a sun, wanted 1 to {MOST}; choose a day with --from and --to"
+        );
+        return Err(Failure::Usage(reason));
+    }
+    Ok(steps)
+}
+
+/// Notes the numbered files, and refuses times with no map or too many, before anything is computed.
+pub fn declare(path: &Path, sunlight: &Sunlight, files: &mut Files) -> Result<(), Failure> {
+    let count = steps(&Hourly::new(sunlight)?)?.len();
+    if is_gif(path)? {
+        return Ok(());
+    }
+    for number in 1..=count {
+        files.writes("--frames", &numbered(path, number))?;
+    }
+    files.check()
+}
+
 impl Baked<'_> {
     /// Writes a map for each step of time with a sun: as a .gif, or as numbered .png files.
     pub fn frames(&self, path: &Path) -> Result<(), Failure> {
         let _writing = interrupt::writing();
         let hourly = Hourly::new(self.sunlight)?;
         let suns = &self.sunlight.suns;
-        let steps: Vec<usize> = (0..hourly.len())
-            .filter(|&step| hourly.sun(step).is_some())
-            .collect();
-        if steps.is_empty() || steps.len() > MOST {
-            let found = steps.len();
-            let reason = format!(
-                "--frames: {found} steps of time have a sun, wanted 1 to {MOST}; choose a day with --from and --to"
-            );
-            return Err(Failure::Usage(reason));
-        }
+        let steps = steps(&hourly)?;
         let plan = self.plan();
         let sheet = map::Sheet::new(&self.args.map, &plan, self.sensors)?;
         let draw = |step: usize| -> Result<Drawing, Failure> {
@@ -70,7 +88,7 @@ impl Baked<'_> {
             let words = self.words(("Sunlight", ""), Some(map::moment(&middle)));
             sheet.draw(&words, &lit, Steps::classes(&CLASSES))
         };
-        if !format(path)? {
+        if !is_gif(path)? {
             for (index, &step) in steps.iter().enumerate() {
                 interrupt::check()?;
                 let pixels = draw(step)?.pixels().map_err(Failure::work)?;
@@ -97,8 +115,8 @@ mod tests {
     fn maps_are_numbered_in_the_folder_of_the_name() {
         let name = numbered(Path::new("out/a.b.png"), 7);
         assert_eq!(name, Path::new("out/a.b-0007.png"));
-        assert!(format(Path::new("a.GIF")).expect("a format"));
-        assert!(!format(Path::new("a.png")).expect("a format"));
-        assert!(format(Path::new("a.mp4")).is_err());
+        assert!(is_gif(Path::new("a.GIF")).expect("a format"));
+        assert!(!is_gif(Path::new("a.png")).expect("a format"));
+        assert!(is_gif(Path::new("a.mp4")).is_err());
     }
 }

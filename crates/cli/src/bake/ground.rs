@@ -230,18 +230,29 @@ fn mesh(scene: &Scene, creases: bool) -> Result<(Mesh, usize), Failure> {
     Ok((all, copies))
 }
 
-/// Adds the mesh of a shape, with its normals turned as the shape says. Returns the number of vertices that creases add.
+/// Adds the mesh of a shape, with its normals and triangles turned as the shape says. Returns the number of vertices that
+/// creases add.
 fn push(all: &mut Mesh, shape: &Shape, mesh: &TriangleMesh, creases: bool) -> usize {
     let has_normals = !mesh.normals.is_empty();
     let is_turned = shape.reverse_orientation != (!has_normals && shape.transform_swaps_handedness);
     let normals: Vec<[f32; 3]> = mesh.normals.iter().map(|n| n.to_array()).collect();
     let uvs: Vec<[f32; 2]> = mesh.uvs.iter().map(|uv| uv.to_array()).collect();
     let triangles = (&mesh.positions[..], &mesh.indices[..]);
-    if creases && !has_normals {
-        return all.push_creased(triangles, &uvs, is_turned);
+    let first = all.indices.len();
+    let copies = match creases && !has_normals {
+        true => all.push_creased(triangles, &uvs, is_turned),
+        false => {
+            all.push(triangles, &normals, &uvs, is_turned);
+            0
+        }
+    };
+    // Corners run anticlockwise as seen from the side that a surface faces.
+    if shape.reverse_orientation != shape.transform_swaps_handedness {
+        for corners in &mut all.indices[first..] {
+            corners.swap(1, 2);
+        }
     }
-    all.push(triangles, &normals, &uvs, is_turned);
-    0
+    copies
 }
 
 /// Sensors of a file, measured from the origin of a scene, and bent with it. Those without a height are put on the surface.

@@ -9,7 +9,7 @@ use antumbra_lab::write_json;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 
-use super::files::field;
+use super::files::{Format, field};
 use super::ground::Ground;
 use super::sun::Baked;
 use crate::args::By;
@@ -31,18 +31,10 @@ impl Row {
     }
 }
 
-/// Whether a file of groups is a .json; otherwise it is a .csv.
-pub fn format(path: &Path) -> Result<bool, Failure> {
-    let extension = path.extension().unwrap_or_default();
-    match ["json", "csv"].map(|known| extension.eq_ignore_ascii_case(known)) {
-        [true, _] => Ok(true),
-        [_, true] => Ok(false),
-        _ => {
-            let path = path.display();
-            let reason = format!("{path}: groups are written as csv or json");
-            Err(Failure::Usage(reason))
-        }
-    }
+/// Whether a file of groups is a .csv; otherwise it is a .json.
+pub fn is_table(path: &Path) -> Result<bool, Failure> {
+    let sentence = "groups are written as csv or json";
+    Ok(Format::of(path, &["csv", "json"], sentence)? == Format::Csv)
 }
 
 /// Groups of the triangles of a scene. `compass` says where its north is.
@@ -114,9 +106,9 @@ impl Baked<'_> {
                 }
             }
         }
-        match format(path)? {
-            true => write_json(&rows, path)?,
-            false => atomic_write(path, |file| file.write_all(table(&rows).as_bytes()))?,
+        match is_table(path)? {
+            true => atomic_write(path, |file| file.write_all(table(&rows).as_bytes()))?,
+            false => write_json(&rows, path)?,
         }
         Ok(rows)
     }

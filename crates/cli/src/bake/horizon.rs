@@ -5,7 +5,8 @@ use std::time::Instant;
 
 use antumbra::{Bvh, Isa, LocalOrigin, Recipe};
 use antumbra_bake::{
-    Array, Entry, FieldHorizonJob, HeightField, HorizonJob, Key, Observer, Orientation, UpAxis,
+    Array, Entry, FieldHorizonJob, HeightField, HorizonJob, Key, Label, Observer, Orientation,
+    UpAxis,
 };
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
@@ -41,28 +42,20 @@ struct Document<'a> {
 
 /// Refuses outputs that cannot be made, before anything is read.
 pub fn check(args: &HorizonArgs) -> Result<(), Failure> {
-    let places = &args.places;
     let sentence = "horizons are written as csv, npz, tif, asc or npy";
     for path in &args.output {
         let known = ["csv", "npz", "tif", "tiff", "asc", "npy"];
         if Format::of(path, &known, sentence)? != Format::Raster {
             continue;
         }
-        let has_cells = match places.seen_from {
-            Some(_) => false,
-            None => places.grid.is_some() || places.vertices && raster::is_raster(&args.scene),
-        };
-        let path = path.display();
-        if !has_cells {
-            let reason = "a raster needs --grid from above, or --cells of a scene that is one";
-            return Err(Failure::Usage(format!("{path}: {reason}")));
-        }
+        places::check_raster(path, &args.places, &args.scene)?;
         if args.azimuths != 1 {
+            let path = path.display();
             let reason = "a raster has one azimuth: --azimuths 1 with --first";
             return Err(Failure::Usage(format!("{path}: {reason}")));
         }
     }
-    places::check(places)
+    places::check(&args.places)
 }
 
 /// Runs the command, or merges parts of it.
@@ -251,11 +244,7 @@ struct Table<'a> {
 
 impl Table<'_> {
     /// Writes a table or arrays; false for a raster, which is written otherwise.
-    fn write(
-        &self,
-        path: &Path,
-        labels: (&[[f32; 3]], &[antumbra_bake::Label]),
-    ) -> Result<bool, Failure> {
+    fn write(&self, path: &Path, labels: (&[[f32; 3]], &[Label])) -> Result<bool, Failure> {
         let width = self.azimuths.len();
         match Format::of_sensors(path)? {
             Format::Csv => {

@@ -1,5 +1,7 @@
 //! Names of the triangles of a scene: objects and materials.
 
+use std::collections::BTreeSet;
+
 use antumbra_bake::Mesh;
 use antumbra_load::{Names, Part};
 use antumbra_scene::{Geometry, Scene};
@@ -79,7 +81,8 @@ impl Objects<'_> {
         match &self.bodies {
             Some(bodies) => format!("body {}", bodies[triangle] + 1),
             None => {
-                (self.parts.part(triangle)).map_or_else(String::new, |part| part.object.clone())
+                let part = self.parts.part(triangle);
+                part.map_or_else(String::new, |part| part.object.clone())
             }
         }
     }
@@ -90,15 +93,8 @@ impl Objects<'_> {
             let all = bodies.iter().max().map_or(0, |&last| last as usize + 1);
             return (1..=all.min(count)).map(|i| format!("body {i}")).collect();
         }
-        let mut names: Vec<&String> = self
-            .parts
-            .runs
-            .iter()
-            .map(|(_, part)| &part.object)
-            .collect();
-        names.sort_unstable();
-        names.dedup();
-        names.retain(|name| !name.is_empty());
+        let names = self.parts.runs.iter().map(|(_, part)| &part.object);
+        let names: BTreeSet<&String> = names.filter(|name| !name.is_empty()).collect();
         names.into_iter().take(count).cloned().collect()
     }
 }

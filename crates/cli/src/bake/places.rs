@@ -1,9 +1,12 @@
 //! Sensors that the command line places.
 
+use std::path::Path;
+
 use antumbra::{Bvh, Geometry, Recipe};
-use antumbra_bake::{Layout, Mesh, Orientation, Placement, Sensors, UpAxis};
+use antumbra_bake::{Mesh, Orientation, Placement, Sensors, UpAxis};
 
 use super::ground::{self, Ground};
+use super::raster;
 use crate::args::PlaceArgs;
 use crate::exit::Failure;
 
@@ -18,13 +21,24 @@ pub struct Places {
 
 /// Refuses places that cannot be, before anything is read.
 pub fn check(args: &PlaceArgs) -> Result<(), Failure> {
-    if args.only.is_some() && args.grid.is_none() && args.placement.surfaces.is_none() {
-        return Err(Failure::Usage("--only needs --grid or --surfaces".into()));
-    }
     if args.seen_from.is_some() && args.grid.is_none() {
         return Err(Failure::Usage("--seen-from needs --grid".into()));
     }
     args.placement.check().map_err(Failure::Usage)
+}
+
+/// Refuses a raster of results at `path` if sensors are not the cells of one.
+pub fn check_raster(path: &Path, args: &PlaceArgs, scene: &Path) -> Result<(), Failure> {
+    let has_cells = match args.seen_from {
+        Some(_) => false,
+        None => args.grid.is_some() || args.vertices && raster::is_raster(scene),
+    };
+    if has_cells {
+        return Ok(());
+    }
+    let path = path.display();
+    let reason = "a raster needs --grid from above, or --cells of a scene that is one";
+    Err(Failure::Usage(format!("{path}: {reason}")))
 }
 
 impl Places {
@@ -90,14 +104,10 @@ impl Places {
         self.only.as_ref().unwrap_or(&ground.bvh)
     }
 
-    /// Triangle of the mesh that each sensor is on, if any. Sensors on a grid of one object are on it.
+    /// Triangle of the mesh that each sensor is on, if any.
     pub fn triangles(&self, ground: &Ground, up: UpAxis) -> Result<Vec<Option<u32>>, Failure> {
         let level = Orientation::new(up, 0.0).map_err(Failure::usage)?;
-        let down = match self.sensors.layout {
-            Layout::Grid(_) => &self.plan,
-            _ => &level,
-        };
-        let ids = self.sensors.triangles(&ground.bvh, down).into_iter();
+        let ids = self.sensors.triangles(&ground.bvh, &level).into_iter();
         Ok(ids
             .map(|ids| ids.and_then(|ids| ground.parts.flat(ids)))
             .collect())

@@ -76,17 +76,8 @@ pub fn check(args: &SunArgs) -> Result<(), Failure> {
             let path = path.display();
             return Err(Failure::Usage(format!("{path}: a map needs --grid")));
         }
-        let places = &args.places;
-        let has_cells = match places.seen_from {
-            Some(_) => false,
-            None => places.grid.is_some() || places.vertices && raster::is_raster(&args.scene),
-        };
-        if Format::of_sensors(path)? == Format::Raster && !has_cells {
-            let path = path.display();
-            let reason = format!(
-                "{path}: a raster needs --grid from above, or --cells of a scene that is one"
-            );
-            return Err(Failure::Usage(reason));
+        if Format::of_sensors(path)? == Format::Raster {
+            places::check_raster(path, &args.places, &args.scene)?;
         }
     }
     places::check(&args.places)?;
@@ -95,10 +86,10 @@ pub fn check(args: &SunArgs) -> Result<(), Failure> {
     }
     args.frames
         .as_deref()
-        .map_or(Ok(()), |path| frames::format(path).map(drop))?;
+        .map_or(Ok(()), |path| frames::is_gif(path).map(drop))?;
     args.groups
         .as_deref()
-        .map_or(Ok(()), |path| groups::format(path).map(drop))?;
+        .map_or(Ok(()), |path| groups::is_table(path).map(drop))?;
     if args.en17037 {
         check_day(args)?;
     }
@@ -167,6 +158,9 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     let ground = bake.ground(isa, memory, &mut files)?;
     let up = ground.up(args.places.up)?;
     let sunlight = when.sunlight(args, steps, up)?;
+    if let Some(path) = &args.frames {
+        frames::declare(path, &sunlight, &mut files)?;
+    }
     let places = Places::new(&args.places, &ground, up)?;
     let sensors = &places.sensors;
     let job = SunJob::new(&sensors.points, &sensors.normals, &sunlight)?;

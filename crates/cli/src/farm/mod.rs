@@ -62,11 +62,11 @@ impl Plan {
         let Some((output, more)) = args.output.split_first() else {
             return Err(Failure::Usage("--output is missing".into()));
         };
+        if args.lines.is_some() && args.job != FarmJob::Visible {
+            let reason = "--lines: only visible has lines of sight";
+            return Err(Failure::Usage(reason.into()));
+        }
         match args.job {
-            FarmJob::Render if args.lines.is_some() => {
-                let reason = "--lines: only visible has lines of sight";
-                return Err(Failure::Usage(reason.into()));
-            }
             FarmJob::Render => {
                 check_image_names(Some(output), args.stderr_image.as_deref())?;
                 if !more.is_empty() {
@@ -240,10 +240,6 @@ fn check_bake(args: &FarmArgs) -> Result<(), Failure> {
         whole.extend(["-o".into(), path.clone().into_os_string()]);
     }
     if let Some(path) = &args.lines {
-        if args.job != FarmJob::Visible {
-            let reason = "--lines: only visible has lines of sight";
-            return Err(Failure::Usage(reason.into()));
-        }
         whole.extend(["--lines".into(), path.clone().into_os_string()]);
     }
     match parse(&whole)?.command {

@@ -308,6 +308,10 @@ fn shadows_move_in_one_file_or_in_many() {
     assert_eq!(pictures, ["day-0001.png", "day-0002.png", "day-0003.png"]);
     let [first, last] = [0, 2].map(|i| fs::read(place.path(&pictures[i])).expect("a picture"));
     assert_ne!(first, last);
+    // Numbered maps replace no other output and no input.
+    let clash = ["--frames", "day.png", "-o", "day-0003.png"];
+    let run = place.run(&[&flags[..], &clash, &times, day].concat());
+    assert!(run.stderr.contains("two outputs"), "{}", run.stderr);
     place
         .run(&[&flags[..], &["--frames", "day.mp4"], &times, day].concat())
         .expect(2);
@@ -455,4 +459,23 @@ fn view_factors_of_a_box_are_those_of_the_catalogue() {
         .expect(0);
     let read = |name: &str| fs::read(place.path(name)).expect("a file");
     assert!(read("merged.npz") == read("factors.npz"));
+}
+
+#[test]
+fn mirrored_surfaces_face_as_their_normals() {
+    let place = Place::empty();
+    let shape =
+        "Shape \"trianglemesh\" \"integer indices\" [0 1 2] \"point3 P\" [0 0 0 9 0 0 0 9 0]";
+    for (turn, facade) in [
+        ("", "ground"),
+        ("Scale -1 1 1", "ground"),
+        ("ReverseOrientation", "underside"),
+    ] {
+        let scene = format!("Camera \"perspective\" WorldBegin {turn} {shape} WorldEnd");
+        place.write("one.pbrt", scene);
+        let flags = ["factors", "one.pbrt", "--up", "z", "--by", "facade"];
+        let output = ["--samples", "16", "-o", "one.csv"];
+        place.run(&[&flags[..], &output].concat()).expect(0);
+        assert_eq!(table(&place, "one.csv")[1][1], facade, "{turn}");
+    }
 }

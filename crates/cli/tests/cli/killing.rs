@@ -1,4 +1,5 @@
 //! Bakes that are killed or ended in the middle of their work, and go on from their checkpoints.
+#![cfg(unix)]
 
 use std::fs;
 use std::process::{Child, Command, Stdio};
