@@ -1,7 +1,7 @@
 //! Curves as callers give them, and the straight segments that stand for them.
 
 use antumbra::{CurveBasis, Curves, LocalOrigin};
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays::{Numbers, shape_text, wrong_shape};
@@ -51,8 +51,14 @@ enum Kind {
 }
 
 impl Kind {
-    fn read(name: &str) -> PyResult<Self> {
-        match name {
+    fn read(given: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let Ok(name) = given.extract::<String>() else {
+            let found = given.get_type().name()?;
+            return Err(PyTypeError::new_err(format!(
+                "kind: found {found}, wanted a string"
+            )));
+        };
+        match &name[..] {
             "linear" => Ok(Self::Linear),
             "bezier" => Ok(Self::Cubic(CurveBasis::Bezier)),
             "bspline" => Ok(Self::Cubic(CurveBasis::BSpline)),
@@ -98,7 +104,8 @@ impl<'py> Given<'py> {
     pub fn read(object: &Bound<'py, PyAny>) -> PyResult<Self> {
         let points = Numbers::read(&object.getattr("points")?, "points", 3)?;
         let radii = Numbers::read(&object.getattr("radii")?, "radii", 1)?;
-        let kind = Kind::read(&object.getattr("kind")?.extract::<String>()?)?;
+        let name = object.getattr("kind")?;
+        let kind = Kind::read(&name)?;
         let counts = object.getattr("counts")?;
         let lead = points.lead(3);
         if common_shape(&[(&points, 3), (&radii, 1)])? != lead {
@@ -119,7 +126,7 @@ impl<'py> Given<'py> {
         if let Some((curve, found)) =
             (counts.iter().enumerate()).find(|(_, count)| kind.pieces(**count).is_none())
         {
-            let (name, wanted) = (object.getattr("kind")?, kind.wanted());
+            let wanted = kind.wanted();
             return Err(PyValueError::new_err(format!(
                 "points: found {found} of curve {curve}, wanted {wanted} for the kind {name}"
             )));

@@ -7,7 +7,8 @@
 //! So a ray that is open in the group is traced once more, from there to the smallest positive number, if anything can be hit so
 //! near to its point. Set-up of rays in the kernel bounds how near: at its distance `t`, a ray is off a point of the triangle
 //! that it hits by at most `11 u R` on each axis. That is less than the origin offset, so points without a surface within the
-//! origin offset need no second look. It holds for triangles that no instance places, where `t` does not depend on the interval.
+//! origin offset need no second look. The bound holds for triangles that no instance places: their `t` does not depend on the
+//! interval.
 
 use antumbra::{Aabb, Directions, Distance, Ray};
 use antumbra_bake::along_curve;
@@ -27,7 +28,7 @@ const RAYS: (usize, usize) = (1 << 14, 1 << 20);
 /// Most points of a thread at a time, however few directions there are.
 const MOST_POINTS: usize = 1 << 12;
 
-/// Fewer directions than this do not pay, as measured by bench/python/groups.py.
+/// Fewer directions than this do not pay: see bench/record/zen3-2026-11-26-python-groups.txt.
 pub const FEW_DIRECTIONS: usize = 32;
 
 /// Points, and the directions in which each has a ray.
@@ -80,14 +81,16 @@ impl RayGroup {
         let points = memory::collected(points, order.len(), "points")?;
         let directions = Directions::new(&self.directions);
         let columns = self.directions.len();
-        let piece = (PIECE / columns).max(1);
-        call.in_pieces(py, points.len(), piece, |range, threads| {
-            let points = &points[range.clone()];
-            let share = points.len() * columns / (4 * threads.count());
+        // Pieces have whole points. Progress counts rays, as in other calls about rays.
+        let piece = (PIECE / columns).max(1) * columns;
+        call.in_pieces(py, points.len() * columns, piece, |rays, threads| {
+            let first = rays.start / columns;
+            let points = &points[first..rays.end / columns];
+            let share = rays.len() / (4 * threads.count());
             let block = (share.clamp(RAYS.0, RAYS.1) / columns).clamp(1, MOST_POINTS);
             py.detach(|| {
                 let of = |(index, points): (usize, &[[f32; 3]])| {
-                    let first = range.start + index * block;
+                    let first = first + index * block;
                     let bits = self.open(scene, points, &directions)?;
                     Ok(Open { first, bits })
                 };
@@ -129,7 +132,7 @@ impl RayGroup {
         open: &mut [u64],
     ) -> PyResult<()> {
         let (bvh, bounds) = (scene.bvh(), scene.bvh().bounds());
-        // And as far as rays of these directions come within the smallest number.
+        // Added to the bound: the way of a ray from 0 to the smallest normal number.
         let sizes = self.directions.as_flattened().iter().map(|x| x.abs());
         let most = sizes.filter(|size| size.is_finite()).fold(0.0, f32::max);
         let limit = |point: &[f32; 3]| {

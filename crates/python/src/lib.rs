@@ -5,8 +5,9 @@
 //! - `arrays`: arguments that are arrays;  `broadcast`: their leading shapes
 //! - `meshes`: meshes of a call;  `curves`: curves;  `placements`: instances
 //! - `geometry`: what scenes are made of;  `scene`: the same with a tree
-//! - `methods`: the class `Queries`, in rooms;  `scenes`: the class `Scene`;  `world`: the class `World`
-//! - `rays`: rays of a call, in pieces;  `groups`: rays from every point in every direction;  `queries`: what they hit;  `hits`: the results;  `points`: questions about points
+//! - `methods`: the class `Queries`, in several files;  `scenes`: the class `Scene`;  `world`: the class `World`
+//! - `rays`: rays of a call, in pieces;  `groups`: rays from every point in every direction
+//! - `queries`: what rays hit;  `hits`: the results;  `points`: questions about points
 //! - `distinct`: hits as trimesh returns them;  `memory`: lists that may not fit
 //! - `bake`: ambient occlusion, sky, sun, visibility between points;  `bits`: the class `BitMatrix`;  `picture`: the class `Picture`;  `map`: the
 //!   class `Map`

@@ -103,13 +103,26 @@ fn flat(
     placements: Vec<Placement>,
     is_placed: &mut [bool],
 ) -> PyResult<(Vec<Placement>, Vec<i32>)> {
-    let held = |item: &Item<'_>| match item {
-        Item::Assembly(instances) => placements::placements(instances, items.len()).map(Some),
+    let held = |(index, item): (usize, &Item<'_>)| match item {
+        Item::Assembly(instances) => placements::placements(instances, items.len())
+            .map(Some)
+            .map_err(|error| in_item(instances.py(), index, &error)),
         _ => Ok(None),
     };
-    let inside = items.iter().map(held).collect::<PyResult<Vec<_>>>()?;
-    for placement in placements.iter().chain(inside.iter().flatten().flatten()) {
-        is_placed[placement.mesh] = true;
+    let inside = items.iter().enumerate().map(held);
+    let inside = inside.collect::<PyResult<Vec<_>>>()?;
+    // From the world inwards: assemblies that only place each other are not placed.
+    let mut list = &placements[..];
+    let mut open = Vec::new();
+    loop {
+        for placement in list {
+            if !is_placed[placement.mesh] {
+                is_placed[placement.mesh] = true;
+                open.push(placement.mesh);
+            }
+        }
+        let Some(mesh) = open.pop() else { break };
+        list = inside[mesh].as_deref().unwrap_or(&[]);
     }
     let is_lost =
         |(held, is_placed): (&Option<Vec<Placement>>, &bool)| held.is_some() && !is_placed;

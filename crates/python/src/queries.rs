@@ -160,7 +160,7 @@ impl Distinct<'_> {
         &self.kept
     }
 
-    /// Which side of its triangle a ray hits; `None` for spheres, which are hit once.
+    /// Which side of its triangle a ray hits; `None` for spheres and curves, which are hit on one side.
     fn side(&self, ray: &Ray, hit: &Hit) -> Option<bool> {
         let [a, b, c] = self.scene.parts.corners(Ids::of_hit(self.scene, hit))?;
         let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|axis| corner[axis] - a[axis]));

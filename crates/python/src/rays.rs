@@ -472,8 +472,8 @@ impl RayArrays<'_> {
         (self.origins.vector(place), self.directions.vector(place))
     }
 
-    /// The rays as a group, if they go from every origin in every direction and are many. They have no conditions of their own then,
-    /// and one interval.
+    /// The rays as a group, if they go from every origin in every direction, are many, have one interval, and have no conditions
+    /// of their own.
     pub fn group(&self, scene: &SceneData) -> PyResult<Option<RayGroup>> {
         let ends = [&self.near, &self.far];
         let is_one = |end: &Option<Operand<'_>>| {
@@ -509,11 +509,7 @@ impl RayArrays<'_> {
         };
         let origins = memory::collected((0..points).map(origin), points, "points")?;
         let all = memory::collected((0..directions).map(direction), directions, "directions")?;
-        let ends = Ray {
-            tnear: self.get(0).tnear,
-            tfar: self.get(0).tfar,
-            ..Ray::default()
-        };
+        let ends = self.get(0);
         Ok(RayGroup::new(scene, (origins, all), ends, is_by_point))
     }
 }

@@ -83,9 +83,17 @@ impl SceneData {
         }
     }
 
-    /// Whether all there is are triangles that no instance places.
+    /// Whether there are only triangles, and no instance places them.
     pub fn has_only_world_triangles(&self) -> bool {
         self.parts.instances.is_empty() && !self.has_others
+    }
+
+    /// Name of what the leaves of the tree have.
+    pub fn kind(&self) -> &'static str {
+        match self.has_others {
+            true => "primitives",
+            false => "triangles",
+        }
     }
 
     pub fn world(&self) -> Option<&World> {
@@ -187,7 +195,7 @@ pub fn warn(py: Python<'_>, report: &BuildReport) -> PyResult<()> {
     let found = report.dropped;
     let all = found + report.primitives;
     let text = format!(
-        "{found} of {all} triangles, segments or instances can never be hit and were left out: two corners coincide, a number is not finite, or a transform has no inverse"
+        "{found} of {all} triangles, segments or instances can never be hit and were left out: two corners or ends coincide, a number is not finite, a segment has no radius, or a transform has no inverse"
     );
     let text = std::ffi::CString::new(text)?;
     PyErr::warn(py, &py.get_type::<DegenerateWarning>(), &text, 1)

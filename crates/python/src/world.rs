@@ -381,8 +381,8 @@ impl World {
 
     /// Puts the children of the tree in an order that ``relearn`` learned, of this world or of a copy of it.
     ///
-    /// Answers stay the same bits. Takes about a tenth of a millisecond. The world may have moved since the order was learned. The nodes
-    /// above the instances follow at the next ``set_instances``. The order of another world changes next to nothing.
+    /// Answers stay the same bits. Takes less than a millisecond for some hundred thousand triangles. The world may have moved since the
+    /// order was learned. The nodes above the instances follow at the next ``set_instances``. The order of another world changes next to nothing.
     ///
     /// Parameters
     /// ----------

@@ -134,6 +134,7 @@ def test_curves_stand_beside_meshes_in_scenes_and_worlds(tmp_path):
     np.testing.assert_array_equal(hits.curve, moved.curve)
     np.testing.assert_array_equal(hits.along, moved.along)
     assert len(scene.vertices) == 8 and repr(scene).startswith("<antumbra.Scene: 2 meshes, ")
+    assert "primitives" in scene._repr_html_()
     assert set(scene.intersect(o, d, mask=2).mesh) == {-1, 1}
     scene.save(tmp_path / "hair")
     for other in (am.Scene.load(tmp_path / "hair"), pickle.loads(pickle.dumps(scene)), scene.learn(o[:500], d[:500])):
@@ -170,6 +171,8 @@ def test_curves_that_are_none_are_refused():
     ]:
         with pytest.raises(ValueError, match=text):
             am.Scene(curves)
+    with pytest.raises(TypeError, match="kind: found int, wanted a string"):
+        am.Scene(am.Curves(line, 0.1, 3))
     with pytest.raises(ValueError, match=r"meshes\[1\]: radii"):
         am.Scene([box(), am.Curves(line, -1)])
     with pytest.warns(am.DegenerateWarning, match="1 of 2"):

@@ -197,6 +197,9 @@ def test_progress_is_told_and_ends_at_the_total():
     SCENE.occluded(np.zeros((700_000, 3)), [0, 0, 1], threads=1, progress=lambda done, total: told.append((done, total)))
     assert [done for done, _ in told] == sorted(done for done, _ in told)
     assert told[-1] == (700_000, 700_000) and len(told) > 1
+    # Every point with every direction.
+    SCENE.occluded(np.zeros((500, 1, 3)), np.ones((64, 3)), progress=lambda done, total: told.append((done, total)))
+    assert told[-1] == (32_000, 32_000)
 
     class Bar:
         total, n = None, 0

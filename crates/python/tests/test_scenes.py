@@ -311,7 +311,9 @@ def test_assemblies_that_cannot_be_are_refused():
         am.Scene([mesh, am.Assembly([(2, move)]), am.Assembly([(1, move)])], instances=[(1, move)])
     with pytest.raises(ValueError, match=r"meshes\[1\]: found an Assembly that nothing places"):
         am.Scene([mesh, am.Assembly([(0, move)])])
-    with pytest.raises(IndexError, match="item 0 names mesh 7, but there are 2 meshes"):
+    with pytest.raises(ValueError, match=r"meshes\[1\]: found an Assembly that nothing places"):
+        am.Scene([mesh, am.Assembly([(0, move), (2, move)]), am.Assembly([(1, move)])])
+    with pytest.raises(IndexError, match=r"meshes\[1\]: instances: item 0 names mesh 7, but there are 2 meshes"):
         am.Scene([mesh, am.Assembly([(7, move)])], instances=[(1, move)])
     with pytest.raises(ValueError, match="found a scene or an Assembly that places its meshes itself"):
         am.World([mesh, am.Assembly([(0, move)])], [move], [0])

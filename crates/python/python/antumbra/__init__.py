@@ -56,7 +56,8 @@ class Curves(NamedTuple):
     """Thin curves, such as hairs, grass and wires: one item in the list of meshes of a scene.
 
     Curves are flat and face every ray: a ray hits what is within the radius of the axis. Inner points join segments without a gap, and
-    both ends are cut off flat. Straight segments stand for cubic curves, and are no farther from them than a tenth of the largest radius.
+    both ends are cut off flat. Straight segments stand for cubic curves, at most 256 for each piece. With fewer, they are no farther from
+    the curve than a tenth of its largest radius.
 
     A hit has the number of the segment in ``triangle``, the number of the curve in ``curve`` and the parameter in ``along``. The
     nearest point of a curve is on its axis. Segments with a number that is not finite, with two equal ends or without a radius are left
@@ -116,7 +117,8 @@ class Assembly(NamedTuple):
     """Instances that are placed together: one item in the list of meshes of a ``Scene``, for instances of instances to any depth.
 
     Each path from the scene to a mesh is an instance of its own: ``hits.instance`` is its number, and ``scene.paths[hits.instance]``
-    the way to it. Some assembly or instance has to place each assembly. Masks of assemblies count for nothing.
+    the path. Each assembly has to be placed, by an instance of the scene or by another assembly that is placed. Masks of assemblies
+    count for nothing.
 
     Parameters
     ----------

@@ -432,7 +432,8 @@ impl Hits {
 
     /// How far along the curve, each of whose pieces is 1 long: float32. NaN for hits on anything else. Made on every use.
     ///
-    /// A piece goes from point to point of linear curves and B-splines. In a Bezier curve it goes from each third point to the next.
+    /// A piece of a linear curve goes from point to point, and a piece of a Bezier curve from each third point to the next. B-splines and
+    /// Catmull-Rom splines of n points have n - 3 pieces.
     #[getter]
     fn along<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         let parts = &self.source.as_ref().ok_or_else(gone)?.parts;

@@ -7,13 +7,11 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::Queries;
-use super::read_masks;
+use super::{Queries, read_masks};
 use crate::arrays::shaped;
 use crate::{html, memory, saved};
 
 #[pymethods]
-#[allow(clippy::too_many_arguments)]
 impl Queries {
     /// Writes the scene or the world to a file, tree and all. ``load`` reads it on any machine.
     ///
@@ -72,8 +70,10 @@ impl Queries {
         data.local().origin.into()
     }
 
-    /// How each instance is reached: int64 of shape (instances, depth), places in the list of instances of the scene, then in the list of the
-    /// ``Assembly`` that is placed there, and so on. -1 behind the last place.
+    /// Path to each instance: int64 of shape (instances, depth), with -1 behind the last place.
+    ///
+    /// The first place of a path is in the list of instances of the scene, each further one in the list of the ``Assembly`` that the place
+    /// before has. Choose hits first: a ray that hits nothing, or a mesh without instances, has the instance -1.
     ///
     /// Examples
     /// --------
@@ -267,10 +267,7 @@ impl Queries {
             count => format!(", {count} instances"),
         };
         let (meshes, primitives) = (data.parts.parts.len(), report.primitives);
-        let kind = match data.has_others {
-            true => "primitives",
-            false => "triangles",
-        };
+        let kind = data.kind();
         let name = slf.get_type().name()?;
         Ok(format!(
             "<antumbra.{name}: {meshes} meshes, {primitives} {kind}{instances}>"
@@ -287,7 +284,7 @@ impl Queries {
         };
         let mut rows = vec![
             ("meshes", data.parts.parts.len().to_string()),
-            ("triangles", report.primitives.to_string()),
+            (data.kind(), report.primitives.to_string()),
             ("instances", report.instances.to_string()),
             ("left out", report.dropped.to_string()),
             ("nodes", report.nodes.to_string()),

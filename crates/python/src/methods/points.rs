@@ -5,13 +5,11 @@ use pyo3::prelude::*;
 
 use super::Queries;
 use crate::arrays::{Numbers, shaped};
-use crate::points;
-use crate::points::Closest;
+use crate::points::{self, Closest};
 use crate::rays::Call;
 use crate::threads::ThreadCount;
 
 #[pymethods]
-#[allow(clippy::too_many_arguments)]
 impl Queries {
     /// Whether points are inside closed meshes.
     ///
