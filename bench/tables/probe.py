@@ -121,7 +121,7 @@ def beats():
         "joint": "`joint`: least measured cost, static",
         "far": "`far`: farthest exit first, nothing learned",
         "octants": "`octants`: eight learned orders",
-        "joint, ways": "`joint` with a learned way for each node",
+        "joint, ways": "`joint` with a learned rule for each node",
     }
     lines = [[name] + [f"{probe_cost(order, rays):.2f}" for rays, _ in RAYS] for order, name in names.items()]
     return table(["order", "shadow rays", "ambient occlusion"], lines)

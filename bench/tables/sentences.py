@@ -9,6 +9,7 @@ import os
 import statistics
 
 from tables import texts
+from tables.texts import spaced
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 KINDS = {
@@ -31,10 +32,6 @@ def two(values, digits):
     """The least and the largest of some values, as a page says them."""
     values = list(values)
     return f"{min(values):.{digits}f} to {max(values):.{digits}f}"
-
-
-def spaced(number):
-    return f"{number:,}".replace(",", " ") if number > 9999 else str(number)
 
 
 def computed(of):
@@ -348,7 +345,7 @@ SOURCES = {
         ("From 32 directions and 16 385 rays on", "setting"),
         ("4 million rays, one thread", "bench/record/zen3-2026-11-26-python-groups.txt", "--rays 4000000"),
         ("1.25 is a quarter along", "defined"),
-        ("takes some 200 bytes", "crates/kernel/src/geometry/nested.rs", "Each takes 200 bytes or so in a tree"),
+        ("takes about 350 bytes, as `sys.getsizeof(tree)` counts", "defined"),
     ],
     "docs/src/python/many-machines.md": [
         ("starts\n  about 0.3 CPU seconds", "bench/record/zen3-2026-11-26-python-machines.txt", "10.66"),
@@ -399,7 +396,7 @@ SOURCES = {
         ("at most 2048 times the file", "crates/image/src/exr.rs", "MAX_INFLATION: u64 = 2048;"),
         ("2 GiB of text per file", "crates/pbrt/src/source.rs", "MAX_TEXT: u64 = (u32::MAX / 2) as u64;"),
         ("64 deep, 100 000 in all", "crates/pbrt/src/parser.rs", "MAX_INCLUDES: usize = 100_000;"),
-        ("| nested blocks | 10 000 |", "crates/pbrt/src/builder.rs", "MAX_BLOCKS: usize = 10_000;"),
+        ("| nested blocks | 10 000 |", "crates/pbrt/src/builder/blocks.rs", "MAX_BLOCKS: usize = 10_000;"),
         ("256 bytes per stored triangle, 128 per pixel", "crates/load/src/estimate.rs", "const PER_TRIANGLE: u64 = 256;"),
         ("takes 39 bytes per pixel", "unrecorded"),
         ("5 seconds or 1 GiB for one input", "fuzz/run", "-timeout=5 -rss_limit_mb=1024"),

@@ -19,6 +19,10 @@ POINTS, GROUPS, JOBS = "zen3-2026-11-25-points.txt", "zen3-2026-11-25-groups.txt
 FRAMES, LEARNING_FRAMES = "zen4-2026-11-24-frame-loop.txt", "zen3-2026-11-25-frame-loop.txt"
 
 
+def spaced(number):
+    return f"{number:,}".replace(",", " ") if number > 9999 else str(number)
+
+
 def timed(name):
     """Nanoseconds and the ratio of rows `scene rays call  N ns  R`, by scene and rays, in the order of the record."""
     found = {}
@@ -70,10 +74,9 @@ SIZES = [1, 2, 4, 8, 12, 16, 24, 32, 64, 256, 1000, 16384]
 
 
 def few_rays():
-    named = lambda size: f"{size:,}".replace(",", " ") if size > 9999 else str(size)
     ours = [f"{few(f'batch of {size}'):.2f}" for size in SIZES]
     theirs = [f"{few(f'rtcOccluded{size}'):.2f}" if size in (4, 8, 16) else "" for size in SIZES]
-    head = ["rays in a call"] + [named(size) for size in SIZES]
+    head = ["rays in a call"] + [spaced(size) for size in SIZES]
     return head, [["`occluded_batch`", *ours], ["Embree's packets", *theirs]]
 
 
@@ -214,7 +217,6 @@ def growth():
         row = re.match(r"(\d+) +(\d+) +[\d.]+ +[\d.]+ +([\d.]+)$", line)
         if row:
             found.setdefault(int(row[1]), {})[int(row[2])] = float(row[3])
-    spaced = lambda number: f"{number:,}".replace(",", " ") if number > 9999 else str(number)
     suns = (128, 4446, 33373)
     rows = [[spaced(sensors)] + [f"{own[n]:.0f}" if n in own else "" for n in suns] for sensors, own in found.items()]
     return ["sensors"] + [f"{spaced(n)} suns" for n in suns], rows

@@ -26,7 +26,7 @@ pub enum Kind {
     Quads,
     Spheres,
     Disks,
-    /// Flat ones.
+    /// Flat curves.
     Curves(Basis),
     User,
     Instance,

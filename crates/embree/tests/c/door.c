@@ -316,8 +316,11 @@ static void curves(void *device) {
     /* The ends are flat. */
     CHECK(down_at(bezier, -0.1f, 4, 5, 1).hit.prim == ~0u && down_at(bezier, 2.9f, 4, 5, 1).hit.prim == 1);
     CHECK(down_at(bezier, 0.5f, 4, 0.45f, 1).hit.prim == ~0u && down_at(bezier, 0.5f, 4, 0.55f, 1).hit.prim == 1);
-    CHECK(down_at(strands(device, 33, points[0][0], 2), 1.5f, 4, 5, 1).hit.u - 0.5f < 1e-6f);
-    CHECK(down_at(strands(device, 59, points[0][0], 2), 1.75f, 4, 5, 1).hit.u - 0.75f < 1e-6f);
+    void *spline = strands(device, 33, points[0][0], 2), *catmull_rom = strands(device, 59, points[0][0], 2);
+    hit = down_at(spline, 1.5f, 4, 5, 1);
+    CHECK(hit.hit.prim == 1 && fabsf(hit.hit.u - 0.5f) < 1e-6f);
+    hit = down_at(catmull_rom, 1.75f, 4, 5, 1);
+    CHECK(hit.hit.prim == 1 && fabsf(hit.hit.u - 0.75f) < 1e-6f);
 
     PointQuery query = {{1.5f, 2, 0}, 0, 10};
     PointContext context;
@@ -333,6 +336,8 @@ static void curves(void *device) {
     rtcReleaseGeometry(triangles);
     rtcReleaseScene(linear);
     rtcReleaseScene(bezier);
+    rtcReleaseScene(spline);
+    rtcReleaseScene(catmull_rom);
 }
 
 static int last_code;
