@@ -1,9 +1,9 @@
-//! What calls of the kernel cost: calls of few rays, builds and curves beside Embree's, batches with conditions, surfaces and occluders
+//! What calls of the kernel cost: calls of few rays, builds, curves and motion beside Embree's, batches with conditions, surfaces and occluders
 //! beside plain ones, visits in batches beside loops, and queries for nearest points beside parry3d's.
 //!
 //!     bench/get-embree
 //!     cargo run --release --manifest-path bench/calls/Cargo.toml -- bench/embree/LIBRARY PART,PART SCENE...
-//!     cargo run --release --manifest-path bench/calls/Cargo.toml -- bench/embree/LIBRARY curves
+//!     cargo run --release --manifest-path bench/calls/Cargo.toml -- bench/embree/LIBRARY curves,motion
 //!     cargo run --release --manifest-path bench/calls/Cargo.toml -- points SCENE...
 //!
 //! CPU time of one thread, everything in turns, medians.
@@ -13,6 +13,7 @@ mod conditions;
 mod curves;
 mod embree;
 mod input;
+mod motion;
 mod points;
 mod sizes;
 mod transmission;
@@ -28,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     // Builds of one thread, which is this one.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
     pool.use_current_thread().build_global()?;
-    let usage = "name `points`, or Embree's library and parts (sizes, conditions, transmission, builds, curves); then scenes";
+    let usage = "name `points`, or Embree's library and parts (sizes, conditions, transmission, builds, curves, motion); then scenes";
     let library = args.next().ok_or(usage)?;
     if library == "points" {
         return points(args);
@@ -38,6 +39,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut embree = embree::Embree::load(&library);
     if has("curves") {
         curves::run(&mut embree, ROUNDS)?;
+    }
+    if has("motion") {
+        motion::run(&mut embree, ROUNDS)?;
     }
     for scene in args {
         let input = input::read(&scene)?;
