@@ -65,6 +65,26 @@ def curves():
     return ["", "fur: camera", "ambient occlusion", "shadow", "long hair: camera", "ambient occlusion", "shadow"], rows
 
 
+MOTION = "zen3-2026-11-26-motion.txt"
+
+
+def motion():
+    calls = ["occluded_batch", "occluded", "intersect_batch", "intersect"]
+    head = ["scene, two keys"] + [f"`{call}`" for call in calls]
+    rows = []
+    for line in lines(MOTION):
+        city = re.match(r"city, moved by ([\d.]+) of its size", line)
+        instances = re.match(r"(\d+) instances", line)
+        row = re.match(r"  (\w+) +[\d.]+ ns +([\d.]+)", line)
+        if city:
+            rows.append([f"city, bent by {100 * float(city[1]):g} % of its size", *[""] * len(calls)])
+        elif instances:
+            rows.append([f"{instances[1]} instances that turn and move", *[""] * len(calls)])
+        elif row and row[1] in calls:
+            rows[-1][1 + calls.index(row[1])] = row[2]
+    return head, rows
+
+
 def few(call):
     """Geometric mean over scenes and rays of the rate relative to `rtcOccluded1`."""
     return statistics.geometric_mean(ratio(CALLS, *place, call) for place in PLACES)
@@ -254,6 +274,7 @@ def python_machines():
 TABLES = {
     "conditions": conditions,
     "curves": curves,
+    "motion": motion,
     "few-rays": few_rays,
     "recipes": recipes,
     "visits": visits,

@@ -51,10 +51,17 @@ pub(crate) struct Affine {
 }
 
 impl Affine {
+    #[inline(always)]
     pub fn new(rows: &[[f32; 4]; 3]) -> Self {
-        Self {
-            rows: rows.map(|row| row.map(f64::from)),
+        let mut affine = Self {
+            rows: [[0.0; 4]; 3],
+        };
+        for (row, numbers) in affine.rows.iter_mut().enumerate() {
+            for (i, number) in numbers.iter_mut().enumerate() {
+                *number = f64::from(rows[row][i]);
+            }
         }
+        affine
     }
 
     /// The linear part applied to a vector.
@@ -88,43 +95,49 @@ impl Affine {
     }
 
     /// The columns in single precision, as [`Placement::object_from_world`] has them.
+    #[inline(always)]
     pub fn columns(&self) -> [[f32; 4]; 4] {
-        core::array::from_fn(|column| {
-            core::array::from_fn(|row| self.rows.get(row).map_or(0.0, |row| row[column] as f32))
-        })
+        let mut columns = [[0.0; 4]; 4];
+        for (row, numbers) in self.rows.iter().enumerate() {
+            for (column, number) in numbers.iter().enumerate() {
+                columns[column][row] = *number as f32;
+            }
+        }
+        columns
     }
 
     /// The inverse; `None` unless there is one, as far as double precision can distinguish.
+    // Computed for each ray that enters a moving instance.
+    #[inline(always)]
     pub fn inverse(&self) -> Option<Self> {
         /// Well above the rounding of a determinant relative to the product of the lengths of the rows.
         const SINGULAR: f64 = 1e-14;
-        let cofactors = self.cofactors();
-        let linear = self.rows.map(|[a, b, c, _]| [a, b, c]);
-        let det = dot(linear[0], cofactors[0]);
-        let scale: f64 = linear.map(|row| math::sqrt(dot(row, row))).iter().product();
+        let [[a, b, c, x], [d, e, f, y], [g, h, i, z]] = self.rows;
+        let (p, q, r) = ([a, b, c], [d, e, f], [g, h, i]);
+        let cofactors = [cross(q, r), cross(r, p), cross(p, q)];
+        let det = dot(p, cofactors[0]);
+        let scale = math::sqrt(dot(p, p)) * math::sqrt(dot(q, q)) * math::sqrt(dot(r, r));
         // Also when something is NaN.
         if !(det.abs() > SINGULAR * scale) {
             return None;
         }
-        let linear = Self {
-            rows: core::array::from_fn(|row| {
-                let [a, b, c] = core::array::from_fn(|column| cofactors[column][row] / det);
-                [a, b, c, 0.0]
-            }),
-        };
-        let moved = linear.vector(self.rows.map(|row| row[3]));
-        let mut inverse = linear;
-        for (row, moved) in inverse.rows.iter_mut().zip(moved) {
-            row[3] = -moved;
+        let mut rows = [[0.0; 4]; 3];
+        for (row, numbers) in rows.iter_mut().enumerate() {
+            for column in 0..3 {
+                numbers[column] = cofactors[column][row] / det;
+            }
+            numbers[3] = -(numbers[0] * x + numbers[1] * y + numbers[2] * z);
         }
-        Some(inverse)
+        Some(Self { rows })
     }
 }
 
+#[inline(always)]
 pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+#[inline(always)]
 pub(crate) fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
