@@ -6,6 +6,7 @@ a file and what must be in it, or one of KINDS.
 
 import math
 import os
+import re
 import statistics
 
 from tables import texts
@@ -25,6 +26,7 @@ ORDER, EMBREE = (f"docs/src/{n}.md" for n in ("occlusion-order", "order-in-embre
 BAKING = tuple(f"docs/src/{n}.md" for n in ("occlusion-baking", "bakes", "sun-and-sky", "visibility"))
 PYTHON = ("docs/src/python/index.md", "docs/src/python/scenes.md")
 RELIABILITY, BENCH = "docs/src/reliability.md", "bench/performance.md"
+MOVING = "docs/src/moving-scenes.md"
 LONG = "bench/results.md"
 
 
@@ -42,6 +44,7 @@ def computed(of):
     yield from timed(of)
     yield from baked(of)
     yield from packages(of)
+    yield from moving(of)
 
 
 def counted(of):
@@ -280,8 +283,22 @@ def packages(of):
     yield PYTHON, "where `occluded` is {:.1f} times and `intersect` {:.1f} times Open3D".format(*two_threads)
 
 
+def moving(of):
+    times = re.findall(r"occluded_batch +([\d.]+) ns.*\n.*nothing moves +([\d.]+) ns", "\n".join(texts.lines(texts.MOTION)))
+    more = [float(at_times) / float(still) for at_times, still in times]
+    meshes, instances = more[:3], more[3:]
+    yield MOVING, f"Moving meshes take {min(meshes):.1f} to {max(meshes):.1f} times as long"
+    yield MOVING, f"Instances take {min(instances):.1f} to {max(instances):.1f} times as long"
+
+
 # The source of each figure that is not computed above: (text of the page, file or one of KINDS, what the file has).
 SOURCES = {
+    MOVING: [
+        ("squeezed by 10 000 or more", "setting"),
+        ("Of 16 384 rays", "bench/calls/src/motion.rs", "RAYS: usize = 1 << 14"),
+        ("at least 200 000 triangles", "bench/calls/src/motion.rs", "builtin:city:200000"),
+        ("each instance 5120", "bench/calls/src/motion.rs", "icosphere(4)"),
+    ],
     "README.md": [("1.89", "Cargo.toml", 'rust-version = "1.89"'), ("JCGT 5(2), 2016", "cited"), ("Version 0.1", "Cargo.toml", 'version = "0.1.0"')],
     RESULTS: [
         ("node tests + 0.15 primitive tests", "bench/tables/records.py", "PRIM = 0.15"),

@@ -441,7 +441,7 @@ mod tests {
         }
     }
 
-    /// The way that papers tell it: quaternions on the arc, rotation times stretch.
+    /// The way of the papers: quaternions on the arc, rotation times stretch.
     #[test]
     fn a_path_follows_the_arc_of_quaternions() {
         let keys = [
