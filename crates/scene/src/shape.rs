@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::{MediumInterface, Param, Rgb, transform};
-use glam::{DMat4, DVec3, Vec2, Vec3};
+use glam::{DMat3, DMat4, DVec3, Mat3, Vec2, Vec3};
 use serde::Serialize;
 
 /// Shape of the scene: a geometry with the attributes in force where it was declared.
@@ -126,17 +126,31 @@ pub struct Sphere {
     pub center: Vec3,
     /// Radius in scene units, positive.
     pub radius: f32,
+    /// Directions of the sphere's own axes: a rotation or a reflection. Coordinates u run around the z axis, from x to
+    /// y, and v from its negative to its positive end.
+    pub axes: Mat3,
 }
 
 impl Sphere {
+    /// Sphere whose axes are the axes of its space.
+    pub fn new(center: Vec3, radius: f32) -> Self {
+        Self {
+            center,
+            radius,
+            axes: Mat3::IDENTITY,
+        }
+    }
+
     /// Transformed sphere; `None` if a non-uniform scale would make it an ellipsoid.
     ///
-    /// Centre and radius are not finite if they leave the range of `f32`.
+    /// Axes turn with the sphere. Centre and radius are not finite if they leave the range of `f32`.
     pub fn transformed(&self, matrix: &DMat4) -> Option<Self> {
         let scale = transform::uniform_scale(matrix)?;
+        let turn = DMat3::from_mat4(*matrix) * scale.recip();
         Some(Self {
             center: transform::point(matrix, self.center.as_dvec3()).as_vec3(),
             radius: (f64::from(self.radius) * scale) as f32,
+            axes: (turn * self.axes.as_dmat3()).as_mat3(),
         })
     }
 }

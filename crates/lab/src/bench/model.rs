@@ -101,10 +101,7 @@ mod tests {
     #[test]
     fn spheres_of_objects_become_meshes_too_and_count_once_for_every_instance() {
         let ball = Shape {
-            geometry: Geometry::Sphere(Sphere {
-                center: Vec3::ZERO,
-                radius: 1.0,
-            }),
+            geometry: Geometry::Sphere(Sphere::new(Vec3::ZERO, 1.0)),
             material: 0,
             area_light: None,
             media: None,

@@ -17,10 +17,7 @@ pub(super) fn sphere(
     report: &mut Report,
 ) -> Option<Geometry> {
     let part = SpherePart::read(lookup, report)?;
-    let whole = Sphere {
-        center: Vec3::ZERO,
-        radius: part.radius as f32,
-    };
+    let whole = Sphere::new(Vec3::ZERO, part.radius as f32);
     match whole.transformed(to_world).filter(|_| part.is_whole()) {
         Some(sphere) => {
             let is_finite = sphere.center.is_finite() && sphere.radius.is_finite();

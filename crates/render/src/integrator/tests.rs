@@ -18,10 +18,7 @@ const MANY: u32 = 5 * ENOUGH as u32 + 7;
 /// A ball in front of the camera and a lamp that half of it sees, under a sky.
 fn scene(integrator: Settings) -> Scene {
     let ball = |z: f32, emission: Option<AreaLight>| Shape {
-        geometry: Geometry::Sphere(Sphere {
-            center: Vec3::new(0.0, 0.0, z),
-            radius: 1.0,
-        }),
+        geometry: Geometry::Sphere(Sphere::new(Vec3::new(0.0, 0.0, z), 1.0)),
         material: 0,
         area_light: emission,
         media: None,

@@ -27,8 +27,8 @@ impl Patch {
     /// not filtered without them. (pbrt-v3's `path` does likewise. Its `directlighting` also knows the neighbours of
     /// rays that mirrors and glass send on.)
     ///
-    /// Triangles without usable coordinates have arbitrary tangents. Spheres, which keep no rotation of their own,
-    /// have u around the z axis of the world or of their object, and v from south to north.
+    /// Triangles without usable coordinates have arbitrary tangents. Spheres have u around their own z axis, and v
+    /// along it.
     ///
     /// Bumps are built on the tangents of pbrt-v3. Where a mesh has normals, these are unit vectors that point
     /// *against* u and v, whatever the scale of the coordinates. Bumps of such meshes are as high, and as inside out,
@@ -124,7 +124,7 @@ impl Patch {
         let point = placement.map_or(surface.point, |placement| {
             placement.object_point(surface.point)
         });
-        let offset = point - sphere.center;
+        let offset = sphere.axes.transpose() * (point - sphere.center);
         let flat = offset.truncate().length();
         // At the poles any meridian will do.
         let (cos, sin) = if flat > 0.0 {
@@ -139,11 +139,11 @@ impl Patch {
             Vec3::new(-sin, cos, 0.0) * (flat * TAU),
             Vec3::new(-offset.z * cos, -offset.z * sin, flat) * PI,
         ];
+        let mut tangents = tangents.map(|tangent| sphere.axes * tangent);
         let mut normal_changes = tangents.map(|t| t / radius);
-        let mut tangents = tangents;
         if let Some(placement) = placement {
-            normal_changes =
-                normal_changes.map(|change| placement.normal_change(offset / radius, change));
+            let normal = (point - sphere.center) / radius;
+            normal_changes = normal_changes.map(|change| placement.normal_change(normal, change));
             tangents = tangents.map(|tangent| placement.tangent(tangent));
         }
         Self {

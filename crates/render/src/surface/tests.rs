@@ -242,10 +242,7 @@ fn blocks_hold_the_surfaces_of_single_hits() {
             let mesh = mesh(seed + 1000 * i, i % 2 == 1);
             shape(Geometry::Mesh(Arc::new(mesh)), i)
         });
-        let ball = Sphere {
-            center: vector(seed + 7),
-            radius: 1.5,
-        };
+        let ball = Sphere::new(vector(seed + 7), 1.5);
         meshes
             .chain([shape(Geometry::Sphere(ball), seed & 1)])
             .collect()

@@ -58,10 +58,7 @@ fn mesh(triangles: usize, vertices: usize) -> Geometry {
 }
 
 fn ball() -> Geometry {
-    Geometry::Sphere(Sphere {
-        center: Vec3::X,
-        radius: 1.5,
-    })
+    Geometry::Sphere(Sphere::new(Vec3::X, 1.5))
 }
 
 fn first_position(shape: &Shape) -> [f32; 3] {

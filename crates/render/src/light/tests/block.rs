@@ -40,10 +40,7 @@ fn scene(lights: usize, strategy: LightStrategy) -> Scene {
         reverse_orientation: two_sided,
         transform_swaps_handedness: false,
     };
-    let ball = Geometry::Sphere(Sphere {
-        center: Vec3::new(-3.0, 1.0, 2.0),
-        radius: 0.5,
-    });
+    let ball = Geometry::Sphere(Sphere::new(Vec3::new(-3.0, 1.0, 2.0), 0.5));
     let shapes = vec![
         shape(mesh(1, false), false),
         shape(mesh(30, false), true),

@@ -113,10 +113,7 @@ fn irradiance_of_a_square_is_its_form_factor() {
 #[test]
 fn irradiance_of_a_sphere() {
     for (radius, distance) in [(1.0_f32, 3.0_f32), (1.0, 1.01), (0.01, 100.0)] {
-        let sphere = Sphere {
-            center: Vec3::Z * distance,
-            radius,
-        };
+        let sphere = Sphere::new(Vec3::Z * distance, radius);
         let light = area(Geometry::Sphere(sphere), false);
         let expected = std::f64::consts::PI * f64::from(radius / distance).powi(2);
         let found = irradiance(&light, &receiver(Vec3::ZERO, Vec3::Z));
@@ -202,10 +199,7 @@ fn elements_add_up_to_the_light() {
 /// The density that a hit reports is the one its sample had.
 #[test]
 fn hits_report_the_density_of_samples() {
-    let sphere = Sphere {
-        center: Vec3::new(0.5, 0.2, 2.0),
-        radius: 0.7,
-    };
+    let sphere = Sphere::new(Vec3::new(0.5, 0.2, 2.0), 0.7);
     let at = receiver(Vec3::new(0.1, 0.2, -0.3), Vec3::Z);
     for light in [area(ceiling(), true), area(Geometry::Sphere(sphere), true)] {
         let Light::Area(emitter) = &light else {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use antumbra_scene::{Film, Shape, Sphere};
-use glam::{Mat4, Quat};
+use glam::{DMat4, DVec3, Mat4, Quat};
 
 use super::*;
 use crate::world::Camera;
@@ -146,7 +146,7 @@ fn tangents_of_triangles_solve_for_their_corners() {
 #[test]
 fn coordinates_of_spheres_are_longitude_and_latitude() {
     let (center, radius) = (Vec3::new(1.0, 2.0, 3.0), 2.0);
-    let shapes = shape(Geometry::Sphere(Sphere { center, radius }));
+    let shapes = shape(Geometry::Sphere(Sphere::new(center, radius)));
     let look = |to: Vec3| {
         let org = center + to.normalize() * 10.0;
         let ray = Ray::new(org.to_array(), (-to.normalize()).to_array());
@@ -181,4 +181,42 @@ fn coordinates_of_spheres_are_longitude_and_latitude() {
         assert!((u * uv.x + v * uv.y - step / radius).length() < 1e-3);
     }
     assert!(look(Vec3::Z).tangents.iter().all(|t| t.is_finite()));
+}
+
+/// A turned or mirrored sphere has the coordinates of the sphere before, and tangents along them.
+#[test]
+fn coordinates_of_spheres_turn_with_them() {
+    let turned = DMat4::from_rotation_x(1.2) * DMat4::from_scale(DVec3::new(-2.0, 2.0, 2.0));
+    let center = Vec3::new(0.0, 0.5, 0.0);
+    let before = Sphere::new(center, 0.5);
+    let after = before.transformed(&turned).expect("an even scale");
+    let look = |sphere: Sphere, to: Vec3| {
+        let org = sphere.center + to * 3.0 * sphere.radius;
+        let hit = Hit {
+            t: 2.0 * sphere.radius,
+            u: 0.0,
+            v: 0.0,
+            prim_id: 0,
+            geom_id: 0,
+            inst_id: antumbra::INVALID_ID,
+        };
+        let ray = Ray::new(org.to_array(), (-to).to_array());
+        at(&shape(Geometry::Sphere(sphere)), &ray, &hit, None)
+    };
+    let place = |matrix: &DMat4, v: Vec3| matrix.transform_vector3(v.as_dvec3()).as_vec3();
+    for to in [
+        Vec3::X,
+        Vec3::new(0.5, 0.7, -0.4),
+        Vec3::new(-0.2, 0.3, 0.9),
+    ] {
+        let to = to.normalize();
+        let (old, new) = (look(before, to), look(after, place(&turned, to) / 2.0));
+        assert!((old.place.uv - new.place.uv).length() < 1e-5, "{to}");
+        for (old, new) in old.tangents.iter().zip(new.tangents) {
+            assert!((place(&turned, *old) - new).length() < 1e-4, "{to}");
+        }
+        for (old, new) in old.normal_changes.iter().zip(new.normal_changes) {
+            assert!((place(&turned, *old) / 2.0 - new).length() < 1e-4, "{to}");
+        }
+    }
 }

@@ -114,7 +114,7 @@ pub fn cube(center: Vec3, half: f32) -> Geometry {
 
 /// A sphere.
 pub fn sphere(center: Vec3, radius: f32) -> Geometry {
-    Geometry::Sphere(Sphere { center, radius })
+    Geometry::Sphere(Sphere::new(center, radius))
 }
 
 /// A floor at z = `height` that faces the origin from beyond it: normal (0, 0, -1).
