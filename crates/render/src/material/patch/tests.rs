@@ -205,7 +205,7 @@ fn coordinates_of_spheres_turn_with_them() {
     };
     let place = |matrix: &DMat4, v: Vec3| matrix.transform_vector3(v.as_dvec3()).as_vec3();
     for to in [
-        Vec3::X,
+        Vec3::new(0.8, 0.1, 0.3),
         Vec3::new(0.5, 0.7, -0.4),
         Vec3::new(-0.2, 0.3, 0.9),
     ] {
