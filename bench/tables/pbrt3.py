@@ -19,10 +19,10 @@ def times():
     """CPU seconds of both programs, scene by scene."""
     found = rows(TIMES)
     table = [
-        [row["scene"], row["size"].replace("x", " x "), row["pbrt-v3 cpu s"], row["antumbra cpu s"], row["speedup"]]
+        [row["scene"], row["size"].replace("x", " x "), row["spp"], row["pbrt-v3 cpu s"], row["antumbra cpu s"], row["speedup"]]
         for row in found
     ]
-    return ["scene", "size", "pbrt-v3, CPU s", "Antumbra, CPU s", "speedup"], table
+    return ["scene", "size", "samples per pixel", "pbrt-v3, CPU s", "Antumbra, CPU s", "speedup"], table
 
 
 def about(scene):
