@@ -39,7 +39,8 @@ pub(crate) fn declare(
 ) -> Option<Light> {
     let mut lookup = Lookup::new(at, format!("light {:?}", kind.text), params);
     if transforms.is_animated() {
-        report.unsupported(at, "moving lights are");
+        let message = "lights do not move, as in pbrt-v3: the transformation at the start is taken";
+        report.note(at, message);
     }
     let to_world = transforms.start;
     if !transform::is_invertible(&to_world) {

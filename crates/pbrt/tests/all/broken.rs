@@ -186,7 +186,6 @@ TransformBegin ›AttributeEnd WorldEnd"#, r#"TransformBegin in line 2"#),
         (r#"WorldBegin ObjectBegin "a" Shape "sphere" ObjectEnd Scale 1 2 1 ›ObjectInstance "a" WorldEnd"#, r#"ellipsoid"#),
         (r#"WorldBegin ObjectBegin "a" ObjectEnd ActiveTransform EndTime Scale 1 1 -1 ›ObjectInstance "a" WorldEnd"#, r#"one mirrors and the other does not"#),
         (r#"WorldBegin ActiveTransform EndTime Scale 1 1 -1 ›Shape "sphere" WorldEnd"#, r#"one mirrors and the other does not"#),
-        (r#"WorldBegin ActiveTransform EndTime Translate 1 0 0 ›LightSource "point" WorldEnd"#, r#"moving"#),
         (r#"›TransformTimes 2 1 WorldBegin WorldEnd"#, r#"do not ascend"#),
         (r#"ActiveTransform EndTime Scale 0 1 1 ›Camera "perspective" WorldBegin WorldEnd"#, r#"cannot be inverted"#),
     ];

@@ -1,5 +1,6 @@
 //! Transformations that differ between the start and the end of the exposure.
 
+use antumbra_scene::Light;
 use glam::{Mat4, Vec3};
 
 use super::{load_text, world};
@@ -113,4 +114,21 @@ fn media_of_shapes_that_move_are_noted() {
     .unwrap();
     let notes: Vec<String> = loaded.notes.iter().map(ToString::to_string).collect();
     assert!(notes.concat().contains("media are left out"), "{notes:?}");
+}
+
+/// Lights take the transformation at the start, as in pbrt-v3.
+#[test]
+fn lights_stay_at_the_start() {
+    let loaded = load_text(
+        r#"WorldBegin ActiveTransform StartTime Translate 1 2 3 ActiveTransform EndTime Translate 9 9 9
+        LightSource "point" WorldEnd"#,
+    )
+    .unwrap();
+    let [Light::Point { position, .. }] = loaded.scene.lights[..] else {
+        panic!("one light");
+    };
+    assert_eq!(position, Vec3::new(1.0, 2.0, 3.0));
+    assert!(!loaded.scene.moves());
+    let notes: Vec<String> = loaded.notes.iter().map(ToString::to_string).collect();
+    assert!(notes.concat().contains("lights do not move"), "{notes:?}");
 }
