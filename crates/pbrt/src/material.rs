@@ -1,9 +1,11 @@
 //! Directives for materials, with the parameters and defaults of pbrt-v3.
 //!
+//! - `disney`: many lobes with artistic parameters
 //! - `hair`: hair
 //! - `subsurface`: bodies in which light is scattered
 //! - `version4`: materials of pbrt-v4
 
+mod disney;
 pub(crate) mod hair;
 mod subsurface;
 pub(crate) mod version4;
@@ -139,7 +141,7 @@ pub(crate) fn of_shape<'a>(
     state: &State,
     report: &mut Report,
 ) -> Material {
-    let overrides = OVERRIDABLE.iter().any(|name| lookup.has(name));
+    let overrides = (OVERRIDABLE.iter().chain(disney::PARAMETERS)).any(|name| lookup.has(name));
     match current {
         Some(spec) if !overrides => spec.material.clone(),
         None if !overrides => DEFAULT,
@@ -216,7 +218,7 @@ fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report)
             roughness: roughness(&mut values, "roughness", 0.1),
             remap_roughness: remap_roughness(&mut values),
         },
-        "disney" => disney(&mut values),
+        "disney" => disney::disney(&mut values),
         "hair" => hair::hair(&mut values),
         "subsurface" => subsurface::coefficients(&mut values),
         "kdsubsurface" => subsurface::diffuse(&mut values),
@@ -293,62 +295,6 @@ fn sigma(values: &mut Textured) -> Param<f32> {
     }
 }
 
-/// Index of refraction: "eta", or "index" if "eta" is not given, as in pbrt.
-/// Parts of `disney` that metallic-roughness does not have. All are 0 by default.
-const DISNEY_PARTS: &[&str] = &[
-    "speculartint",
-    "anisotropic",
-    "sheen",
-    "clearcoat",
-    "spectrans",
-    "scatterdistance",
-    "difftrans",
-    "flatness",
-];
-
-/// Metallic-roughness for the part of `disney` that it covers.
-fn disney(values: &mut Textured) -> Material {
-    for name in DISNEY_PARTS {
-        let is_zero = match *name {
-            "scatterdistance" => values
-                .find::<Rgb>(name)
-                .is_none_or(|(value, _)| value.constant() == Some(&Rgb::ZERO)),
-            name => values
-                .find::<f32>(name)
-                .is_none_or(|(value, _)| value.constant() == Some(&0.0)),
-        };
-        if !is_zero {
-            let feature = format!("{name} of material \"disney\" is");
-            values.report.unsupported(values.lookup.at, feature);
-        }
-    }
-    // These change nothing while their parts are 0.
-    let _ = (
-        values.find::<f32>("sheentint"),
-        values.find::<f32>("clearcoatgloss"),
-    );
-    values.report.note(
-        values.lookup.at,
-        "disney is rendered as metallic-roughness: its base reflects no light back at grazing angles",
-    );
-    let eta = match index_of_refraction(values) {
-        Param::Constant(eta) => eta,
-        Param::Texture(_) => {
-            let feature = "a texture of eta of material \"disney\" is";
-            values.report.unsupported(values.lookup.at, feature);
-            1.5
-        }
-    };
-    let coat = (eta - 1.0) / (eta + 1.0);
-    Material::Metallic {
-        color: values.param("color", 0.5),
-        metallic: values.param("metallic", 0.0),
-        roughness: values.param("roughness", 0.5),
-        coat: Rgb::splat(coat * coat).into(),
-        transmission: 0.0.into(),
-    }
-}
-
 /// Reads the table that a `fourier` names. `None`: a mistake was reported.
 fn fourier(values: &mut Textured) -> Option<Material> {
     let Textured { lookup, report, .. } = values;
@@ -370,6 +316,7 @@ fn fourier(values: &mut Textured) -> Option<Material> {
     }
 }
 
+/// Index of refraction: "eta", or "index" if "eta" is not given, as in pbrt.
 fn index_of_refraction(values: &mut Textured) -> Param<f32> {
     let index = values.find::<f32>("index");
     let eta = values.find("eta").or(index);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use serde::Serialize;
 
-use crate::{FourierTable, Param, Rgb};
+use crate::{Disney, FourierTable, Param, Rgb};
 
 /// Material of a surface: how it scatters light.
 ///
@@ -108,6 +108,8 @@ pub enum Material {
         /// Share of the base that is a thin transparent sheet, 0..=1. Light goes straight through.
         transmission: Param<f32>,
     },
+    /// Lobes with artistic parameters. With light inside, no part of a mixture.
+    Disney(Box<Disney>),
     /// Diffuse base under a dielectric coat, with the light that coat and base reflect to each other.
     ///
     /// White bases lose no light. Coloured ones are more saturated than under [`Self::Substrate`].
@@ -383,6 +385,7 @@ impl Material {
                 let numbers = [u, v, coat_eta, coat_u, coat_v].map(Number);
                 [&[Color(eta), Color(k)], &numbers[..]].concat()
             }
+            Self::Disney(disney) => disney.parts(),
             Self::ThinDielectric { eta } => vec![Number(eta)],
             Self::Fourier(table) => vec![Table(table)],
             Self::Mix {

@@ -1,6 +1,6 @@
 //! Materials: parameters and defaults of pbrt-v3.
 
-use antumbra_scene::{Material, Param, Rgb, Scene};
+use antumbra_scene::{Disney, DisneyBody, Material, Param, Rgb, Scene};
 
 use super::{load_text, tolerated, world};
 
@@ -278,4 +278,124 @@ fn hair_has_the_defaults_of_pbrt() {
             hair(melanin([0.0, 0.2]), 1.6, [0.1, 0.3], 3.0),
         ]
     );
+}
+
+/// Material of a `disney` of the given parameters.
+fn disney(parameters: &str) -> Disney {
+    match material(&format!("Material \"disney\" {parameters}")) {
+        Material::Disney(disney) => *disney,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn disney_has_the_defaults_of_pbrt() {
+    let expected = Disney {
+        color: grey(0.5),
+        metallic: 0.0.into(),
+        eta: 1.5.into(),
+        roughness: 0.5.into(),
+        specular_tint: 0.0.into(),
+        anisotropic: 0.0.into(),
+        sheen: 0.0.into(),
+        sheen_tint: 0.5.into(),
+        clearcoat: 0.0.into(),
+        clearcoat_gloss: 1.0.into(),
+        specular_transmission: 0.0.into(),
+        body: DisneyBody::Solid {
+            scatter_distance: grey(0.0),
+        },
+    };
+    assert_eq!(disney(""), expected);
+    let thin = DisneyBody::Thin {
+        flatness: 0.0.into(),
+        diffuse_transmission: 1.0.into(),
+    };
+    assert_eq!(disney("\"bool thin\" \"true\"").body, thin);
+}
+
+/// Each parameter has its own place. All of them may be textures, and shapes override them.
+#[test]
+fn disney_reads_all_parameters() {
+    let found = disney(
+        r#""rgb color" [.9 .6 .3] "float metallic" .11 "float eta" 1.7 "float roughness" .12 "float speculartint" .13
+        "float anisotropic" .14 "float sheen" 1.5 "float sheentint" .16 "float clearcoat" 2 "float clearcoatgloss" .18
+        "float spectrans" .19 "bool thin" "true" "float flatness" .21 "float difftrans" 1.2"#,
+    );
+    let expected = Disney {
+        color: Rgb::new(0.9, 0.6, 0.3).into(),
+        metallic: 0.11.into(),
+        eta: 1.7.into(),
+        roughness: 0.12.into(),
+        specular_tint: 0.13.into(),
+        anisotropic: 0.14.into(),
+        sheen: 1.5.into(),
+        sheen_tint: 0.16.into(),
+        clearcoat: 2.0.into(),
+        clearcoat_gloss: 0.18.into(),
+        specular_transmission: 0.19.into(),
+        body: DisneyBody::Thin {
+            flatness: 0.21.into(),
+            diffuse_transmission: 1.2.into(),
+        },
+    };
+    assert_eq!(found, expected);
+    for name in [
+        "metallic",
+        "eta",
+        "roughness",
+        "speculartint",
+        "anisotropic",
+        "sheen",
+        "sheentint",
+        "clearcoat",
+        "clearcoatgloss",
+        "spectrans",
+        "flatness",
+        "difftrans",
+    ] {
+        let found = world(&format!(
+            r#"Texture "t" "float" "checkerboard" Material "disney" "bool thin" "true" "texture {name}" "t" {TRIANGLE}"#
+        ));
+        let text = format!("{:?}", found.materials);
+        assert!(text.contains("Checkerboard"), "{name}: {text}");
+    }
+    let found = world(&format!(
+        r#"Texture "t" "color" "checkerboard" Material "disney" "texture color" "t" "texture scatterdistance" "t"
+        {TRIANGLE} "float metallic" .5"#
+    ));
+    let Material::Disney(found) = of_shape(&found, 0) else {
+        panic!("{:?}", found.materials);
+    };
+    assert!(found.color.constant().is_none() && found.scatters_inside());
+    assert_eq!(found.metallic, 0.5.into());
+}
+
+/// What does nothing, or is taken as something else, is said. What is not supported is an error.
+#[test]
+fn disney_says_what_it_leaves_out() {
+    for (parameters, expected) in [
+        (
+            r#""bool thin" "true" "rgb scatterdistance" [1 1 1]"#,
+            "\"scatterdistance\" is left out",
+        ),
+        (r#""float flatness" .5"#, "\"flatness\" is left out"),
+        (r#""float metallic" 1.5"#, "\"metallic\" is taken as 1"),
+        (
+            r#""rgb scatterdistance" [1 1 1]"#,
+            "subsurface scattering is rendered by walks",
+        ),
+        (
+            r#""rgb scatterdistance" [1 1 1] "float spectrans" .5"#,
+            "\"scatterdistance\" together with \"spectrans\" is not supported",
+        ),
+    ] {
+        let text = format!("WorldBegin Material \"disney\" {parameters} {TRIANGLE} WorldEnd");
+        let (_, said) = tolerated(&text);
+        let said: String = said.iter().map(|one| one.message.as_str()).collect();
+        assert!(said.contains(expected), "{parameters}: {said}");
+    }
+    let broken = load_text(r#"WorldBegin Material "disney" "float eta" 0 WorldEnd"#);
+    let error = broken.err().expect("an index of 0").to_string();
+    assert!(error.contains("must be positive, found 0"), "{error}");
 }

@@ -438,31 +438,6 @@ fn comments_and_strings_do_not_make_version_4() {
     assert!(!error.to_string().contains("pbrt-v4"), "{error}");
 }
 
-/// The part of disney that metallic-roughness covers is read, the rest is named.
-#[test]
-fn disney_is_read_where_it_maps() {
-    let text = |more: &str| {
-        format!(
-            "WorldBegin Material \"disney\" \"rgb color\" [.9 .6 .3] \"float metallic\" 1 {more} Shape \"sphere\" WorldEnd"
-        )
-    };
-    let read = scene(&text("\"float roughness\" 0.4"));
-    let found = format!("{:?}", read.materials);
-    assert!(
-        found.contains("Metallic") && found.contains("0.4"),
-        "{found}"
-    );
-    let Err(error) = load_text(&text("\"float sheen\" 0.5")) else {
-        panic!("it should be refused");
-    };
-    assert!(
-        error
-            .to_string()
-            .contains("sheen of material \"disney\" is not supported"),
-        "{error}"
-    );
-}
-
 #[test]
 fn materials_without_an_equal_can_be_left_out() {
     let text = NEW.replace(

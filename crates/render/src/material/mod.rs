@@ -2,12 +2,14 @@
 //!
 //! - [`Material`]: a material ready for shading
 //! - `parameters.rs`: parameters of every kind of material, and the BSDF that they make
+//! - `disney.rs`: the same for the material `disney`
 //! - `patch.rs`: surroundings of a point, for textures and bumps
 //! - `bsdf/`: how a point scatters light
 //!
 //! Materials whose parameters are constant have one [`Bsdf`]. Other materials make one at every point.
 
 pub mod bsdf;
+mod disney;
 mod parameters;
 mod patch;
 

@@ -10,6 +10,7 @@ use super::bsdf::{
     Lobe, Metallic, MetallicParameters, Specular, Subsurface, TrowbridgeReitz, absorption_of_color,
     absorption_of_melanin, albedo_of,
 };
+use super::disney::Disney;
 use crate::medium::Coefficients;
 use crate::texture::{Input, Place, Textures, Value};
 
@@ -68,6 +69,7 @@ pub enum Parameters {
         coat: Input<Rgb>,
         transparent: Input<f32>,
     },
+    Disney(Box<Disney>),
     CoatedDiffuse {
         reflectance: Input<Rgb>,
         eta: Input<f32>,
@@ -168,7 +170,8 @@ pub struct Lowering<'a> {
 }
 
 impl Lowering<'_> {
-    fn input<T: Value>(&mut self, param: &Param<T>) -> Input<T> {
+    /// Lowers one parameter.
+    pub fn input<T: Value>(&mut self, param: &Param<T>) -> Input<T> {
         self.varies |= param.constant().is_none();
         self.textures.input(param)
     }
@@ -286,6 +289,7 @@ impl Lowering<'_> {
                 coat_eta: self.input(coat_eta),
                 coat_roughness: self.roughness(coat_roughness.each_ref(), false),
             },
+            Scene::Disney(disney) => Parameters::Disney(Box::new(Disney::new(disney, self))),
             Scene::ThinDielectric { eta } => Parameters::ThinDielectric {
                 eta: self.input(eta),
             },
@@ -534,6 +538,7 @@ impl Parameters {
                     )),
                 ])
             }
+            Self::Disney(disney) => disney.bsdf(place),
             Self::ThinDielectric { eta } => Bsdf::specular(Specular::Pane {
                 scale: Vec3::ONE,
                 eta: eta.at(place),

@@ -57,6 +57,7 @@ pub fn is_body(material: &Material) -> bool {
     match material {
         Material::Hair { .. } => true,
         Material::Subsurface { .. } => true,
+        Material::Disney(disney) => disney.scatters_inside(),
         Material::Bumped { material, .. } | Material::NormalMapped { material, .. } => {
             is_body(material)
         }
@@ -69,6 +70,7 @@ pub fn is_body(material: &Material) -> bool {
 fn is_subsurface(material: &Material) -> bool {
     match material {
         Material::Mix { materials, .. } => materials.iter().any(|part| is_subsurface(part)),
+        Material::Disney(disney) => disney.scatters_inside(),
         material => matches!(material, Material::Subsurface { .. }),
     }
 }
@@ -94,7 +96,7 @@ fn check_bodies(scene: &Scene) -> Result<(), Error> {
                 }
                 "the index of refraction or the mean cosine is out of range"
             }
-            (Material::Hair { .. }, _) => continue,
+            (Material::Hair { .. }, _) | (Material::Disney(_), _) => continue,
             (Material::Mix { materials, .. }, _) if !materials.iter().any(|m| is_subsurface(m)) => {
                 continue;
             }

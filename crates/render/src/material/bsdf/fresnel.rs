@@ -14,6 +14,15 @@ pub enum Fresnel {
         /// Absorption coefficient.
         k: Vec3,
     },
+    /// Dielectric and metal of the material `disney`.
+    Disney {
+        /// Reflectance of the metal at normal incidence.
+        r0: Vec3,
+        /// Share of metal.
+        metallic: f32,
+        /// Index of refraction of the dielectric, below the normal over above it.
+        eta: f32,
+    },
     /// Dielectric coat of this index of refraction, equal from both sides of the surface.
     Coat(f32),
     /// Conductor below a dielectric coat, without the light that the coat itself reflects.

@@ -3,6 +3,7 @@
 
 use glam::Vec3;
 
+use super::albedo::schlick_part;
 use super::fresnel::{Fresnel, coated, conductor, dielectric};
 use super::microfacet::TrowbridgeReitz;
 use crate::surface::{reflect, refract, same_hemisphere};
@@ -58,6 +59,12 @@ impl GlossyReflection {
             }
             Fresnel::Conductor { eta, k } => {
                 self.scale * conductor(wi.dot(h), eta, k) * (geometry / share)
+            }
+            Fresnel::Disney { r0, metallic, eta } => {
+                let cos = wi.dot(outside);
+                let metal = r0 + (Vec3::ONE - r0) * schlick_part(cos);
+                let reflected = Vec3::splat(dielectric(cos, eta)).lerp(metal, metallic);
+                self.scale * reflected * (geometry / share)
             }
             Fresnel::Coat(eta) => {
                 self.scale * (dielectric(wi.dot(h).abs(), eta) * geometry / share)

@@ -6,8 +6,8 @@ use glam::Vec3;
 
 use super::specular::SpecularSample;
 use super::{
-    Blend, Diffuse, Evaluation, Fourier, GlossyReflection, GlossyTransmission, Hair, Metallic,
-    Specular, cosine_side,
+    Blend, Clearcoat, Diffuse, DisneyBase, Evaluation, Fourier, GlossyReflection,
+    GlossyTransmission, Hair, Metallic, Specular, cosine_side,
 };
 use crate::surface::same_hemisphere;
 
@@ -26,6 +26,10 @@ pub enum Lobe {
     Blend(Blend),
     /// Coat, base and metal.
     Metallic(Metallic),
+    /// Base of the material `disney`.
+    DisneyBase(DisneyBase),
+    /// Clear coat of the material `disney`.
+    Clearcoat(Clearcoat),
     /// Scattering to both sides by a table.
     Fourier(Fourier),
     /// A hair.
@@ -44,6 +48,8 @@ impl Lobe {
             Self::GlossyTransmission(lobe) => Self::GlossyTransmission(lobe.scaled(scale)),
             Self::Blend(lobe) => Self::Blend(lobe.scaled(scale)),
             Self::Metallic(lobe) => Self::Metallic(lobe.scaled(scale)),
+            Self::DisneyBase(lobe) => Self::DisneyBase(lobe.scaled(scale)),
+            Self::Clearcoat(lobe) => Self::Clearcoat(lobe.scaled(scale)),
             Self::Fourier(lobe) => Self::Fourier(lobe.scaled(scale)),
             Self::Hair(lobe) => Self::Hair(lobe.scaled(scale)),
             Self::Specular(lobe) => Self::Specular(lobe.scaled(scale)),
@@ -58,6 +64,8 @@ impl Lobe {
             Self::GlossyTransmission(lobe) => lobe.is_black(),
             Self::Blend(lobe) => lobe.is_black(),
             Self::Metallic(lobe) => lobe.is_black(),
+            Self::DisneyBase(lobe) => lobe.is_black(),
+            Self::Clearcoat(lobe) => lobe.is_black(),
             Self::Fourier(lobe) => lobe.is_black(),
             Self::Hair(lobe) => lobe.is_black(),
             Self::Specular(lobe) => lobe.is_black(),
@@ -71,7 +79,12 @@ impl Lobe {
             | Self::Fourier(_)
             | Self::Hair(_) => true,
             Self::Specular(lobe) => lobe.transmits(),
-            Self::Diffuse(_) | Self::Glossy(_) | Self::Blend(_) | Self::Metallic(_) => false,
+            Self::Diffuse(_)
+            | Self::Glossy(_)
+            | Self::Blend(_)
+            | Self::Metallic(_)
+            | Self::DisneyBase(_)
+            | Self::Clearcoat(_) => false,
         }
     }
 
@@ -89,6 +102,8 @@ impl Lobe {
             Self::Diffuse(_)
             | Self::DiffuseTransmission(_)
             | Self::Metallic(_)
+            | Self::DisneyBase(_)
+            | Self::Clearcoat(_)
             | Self::Fourier(_)
             | Self::Specular(_) => false,
         }
@@ -124,6 +139,18 @@ impl Lobe {
                 value: lobe.value(wo, wi),
                 pdf: lobe.pdf(wo, wi),
             },
+            Self::DisneyBase(lobe) => Evaluation {
+                value: lobe.value(wo, wi),
+                pdf: if same_hemisphere(wo, wi) {
+                    wi.z.abs() * FRAC_1_PI
+                } else {
+                    0.0
+                },
+            },
+            Self::Clearcoat(lobe) => Evaluation {
+                value: lobe.value(wo, wi),
+                pdf: lobe.pdf(wo, wi),
+            },
             Self::Fourier(lobe) => Evaluation {
                 value: lobe.value(wo, wi),
                 pdf: lobe.pdf(wo, wi),
@@ -135,7 +162,8 @@ impl Lobe {
 
     fn sample(&self, wo: Vec3, choice: f32, u: [f32; 2]) -> Option<Vec3> {
         match self {
-            Self::Diffuse(_) => Some(cosine_side(wo, u)),
+            Self::Diffuse(_) | Self::DisneyBase(_) => Some(cosine_side(wo, u)),
+            Self::Clearcoat(lobe) => lobe.sample(wo, u),
             Self::DiffuseTransmission(_) => Some(cosine_side(-wo, u)),
             Self::Glossy(lobe) => lobe.sample(wo, u),
             Self::GlossyTransmission(lobe) => lobe.sample(wo, u),

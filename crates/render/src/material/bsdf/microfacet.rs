@@ -8,6 +8,8 @@ use crate::sampler::warp::disk;
 #[derive(Clone, Copy, Debug)]
 pub struct TrowbridgeReitz {
     alpha: [f32; 2],
+    /// Whether masking and shadowing are independent of each other.
+    separable: bool,
 }
 
 /// Least alpha, as in pbrt-v3.
@@ -20,6 +22,15 @@ impl TrowbridgeReitz {
         let alpha = |value| if remap { alpha_of(value) } else { value };
         Self {
             alpha: roughness.map(|value| alpha(value).max(MIN_ALPHA)),
+            separable: false,
+        }
+    }
+
+    /// Facets of these alphas along x and y, whose masking is independent of their shadowing, as `disney` has them.
+    pub fn separable(alpha: [f32; 2]) -> Self {
+        Self {
+            separable: true,
+            ..Self::new(alpha, false)
         }
     }
 
@@ -43,8 +54,11 @@ impl TrowbridgeReitz {
         0.5 * ((1.0 + (x * x + y * y) / (w.z * w.z)).sqrt() - 1.0)
     }
 
-    /// Share of facets seen from both directions (height-correlated Smith).
+    /// Share of facets seen from both directions (Smith, by default correlated by height).
     pub fn masking_shadowing(self, wo: Vec3, wi: Vec3) -> f32 {
+        if self.separable {
+            return self.masking(wo) * self.masking(wi);
+        }
         1.0 / (1.0 + self.lambda(wo) + self.lambda(wi))
     }
 

@@ -8,6 +8,7 @@
 //! - `glossy.rs`: reflection and transmission by microfacets
 //! - `blend.rs`: a coat that takes its share from the base
 //! - `metallic.rs`: dielectrics and metals by glTF's model, with `albedo.rs`, what their facets reflect in all
+//! - `disney.rs`: base and clear coat of the material `disney`
 //! - `fourier.rs`: tables of measured or simulated scattering
 //! - `hair.rs`: fibres
 //! - `specular.rs`: perfect mirrors and smooth dielectrics
@@ -22,6 +23,7 @@
 mod albedo;
 mod blend;
 mod diffuse;
+mod disney;
 mod fourier;
 mod fresnel;
 mod glossy;
@@ -41,6 +43,7 @@ use crate::sampler::warp::cosine_hemisphere;
 use crate::surface::same_hemisphere;
 pub use blend::Blend;
 pub use diffuse::Diffuse;
+pub use disney::{Clearcoat, DisneyBase};
 pub use fourier::Fourier;
 pub use fresnel::Fresnel;
 pub use glossy::{GlossyReflection, GlossyTransmission};

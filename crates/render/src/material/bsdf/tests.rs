@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use antumbra_scene::{Material, Param};
+use antumbra_scene::{Disney, DisneyBody, Material, Param};
 
 use super::*;
 use crate::sampler::warp::uniform_sphere;
@@ -124,6 +124,41 @@ fn coated_metal([eta, k]: [f32; 2], roughness: f32, coat_eta: f32, coat: [f32; 2
     }
 }
 
+/// A `disney` of one grey: metal, roughness, anisotropy, sheen, clear coat, its gloss, and refraction.
+fn disney(color: f32, numbers: [f32; 7], thin: Option<[f32; 2]>) -> Material {
+    let [
+        metallic,
+        roughness,
+        anisotropic,
+        sheen,
+        coat,
+        gloss,
+        refracted,
+    ] = numbers;
+    Material::Disney(Box::new(Disney {
+        color: Vec3::splat(color).into(),
+        metallic: metallic.into(),
+        eta: 1.5.into(),
+        roughness: roughness.into(),
+        specular_tint: 0.3.into(),
+        anisotropic: anisotropic.into(),
+        sheen: sheen.into(),
+        sheen_tint: 0.5.into(),
+        clearcoat: coat.into(),
+        clearcoat_gloss: gloss.into(),
+        specular_transmission: refracted.into(),
+        body: match thin {
+            Some([flatness, passed]) => DisneyBody::Thin {
+                flatness: flatness.into(),
+                diffuse_transmission: passed.into(),
+            },
+            None => DisneyBody::Solid {
+                scatter_distance: Vec3::ZERO.into(),
+            },
+        },
+    }))
+}
+
 fn mix(first: Material, second: Material, amount: f32) -> Material {
     Material::Mix {
         materials: [Arc::new(first), Arc::new(second)],
@@ -185,6 +220,26 @@ fn materials() -> Vec<(&'static str, Material, Holds)> {
             "brushed coat",
             coated_metal([1.5, 7.0], 0.2, 1.4, [0.2, 0.5]),
             Energy,
+        ),
+        (
+            "disney",
+            disney(0.7, [0.0, 0.5, 0.0, 0.0, 0.0, 1.0, 0.0], None),
+            Reciprocity,
+        ),
+        (
+            "brushed disney",
+            disney(0.9, [0.6, 0.6, 0.8, 0.5, 1.0, 0.3, 0.0], None),
+            Reciprocity,
+        ),
+        (
+            "clear disney",
+            disney(0.9, [0.2, 0.5, 0.5, 0.0, 0.5, 0.0, 0.7], None),
+            Reciprocity,
+        ),
+        (
+            "thin disney",
+            disney(0.9, [0.1, 0.7, 0.3, 0.4, 0.0, 0.0, 0.0], Some([0.6, 1.2])),
+            Reciprocity,
         ),
         ("foil", metallic(0.8, [0.1, 0.5], 0.04, 0.6), Energy),
     ]
