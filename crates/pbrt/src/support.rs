@@ -51,7 +51,7 @@ const GROUPS: &[Group] = &[
     Group {
         heading: "Shapes",
         supported: shape::SUPPORTED,
-        unsupported: shape::UNSUPPORTED,
+        unsupported: &[],
         scene: r#"WorldBegin Shape "NAME" WorldEnd"#,
     },
     Group {

@@ -118,7 +118,7 @@ fn what_is_not_supported_can_be_left_out() {
     let scene = "Film \"image\" \"integer xresolution\" [8] \"integer yresolution\" [8]\n\
         Integrator \"bdpt\"\n\
         WorldBegin\n\
-        Shape \"cone\"\n\
+        Shape \"hyperboloid\" \"point p1\" [-1 0 -1] \"point p2\" [1 0 1]\n\
         NamedMaterial \"nowhere\"\n\
         Shape \"sphere\"\n\
         WorldEnd\n";
@@ -126,7 +126,7 @@ fn what_is_not_supported_can_be_left_out() {
     let run = place
         .run(&["render", "fog.pbrt", "-o", "out.png"])
         .expect(65);
-    assert!(run.stderr.contains("fog.pbrt:4:7: error: shape \"cone\""));
+    assert!(run.stderr.contains("fog.pbrt:4:1: error: a hyperboloid"));
     let args = [
         "render",
         "fog.pbrt",
@@ -139,7 +139,7 @@ fn what_is_not_supported_can_be_left_out() {
     let run = place.run(&args).expect(0);
     for said in [
         "fog.pbrt:2:12: note: integrator \"bdpt\" is taken as \"volpath\"",
-        "fog.pbrt:4:7: warning: shape \"cone\" is not supported yet, and left out",
+        "fog.pbrt:4:1: warning: a hyperboloid whose line crosses the axis between its ends is not supported yet, and left out",
         "fog.pbrt:5:15: warning: no material is named \"nowhere\" here",
     ] {
         assert!(run.stderr.contains(said), "{said}\n{}", run.stderr);

@@ -2,13 +2,16 @@
 //!
 //! - `mesh`: triangle meshes and their alpha masks;  `subdivision`: meshes that are made smooth
 //! - `bilinear`: patches of pbrt-v4;  `sphere`: spheres
-//! - `quadric`, `curve`: smooth surfaces, tessellated to meshes by `grid`
+//! - `quadric`, `revolved`, `nurbs`, `curve`: smooth surfaces, tessellated to meshes by `grid`;  `heightfield`: heights
 
 mod bilinear;
 mod curve;
 mod grid;
+mod heightfield;
 mod mesh;
+mod nurbs;
 mod quadric;
+mod revolved;
 mod sphere;
 mod subdivision;
 
@@ -27,10 +30,15 @@ use crate::texture::Textured;
 
 /// Supported shapes.
 pub(crate) const SUPPORTED: &[&str] = &[
+    "cone",
     "curve",
     "cylinder",
     "disk",
+    "heightfield",
+    "hyperboloid",
     "loopsubdiv",
+    "nurbs",
+    "paraboloid",
     "plymesh",
     "sphere",
     "trianglemesh",
@@ -38,10 +46,6 @@ pub(crate) const SUPPORTED: &[&str] = &[
 
 /// Shapes of pbrt-v4 that version 3 does not have.
 pub(crate) const SUPPORTED4: &[&str] = &["bilinearmesh"];
-
-/// Shapes of pbrt-v3 that are not supported.
-pub(crate) const UNSUPPORTED: &[&str] =
-    &["cone", "heightfield", "hyperboloid", "nurbs", "paraboloid"];
 
 /// Source of a shape's geometry: the scene itself, or a file.
 pub(crate) enum Source {
@@ -96,6 +100,26 @@ pub(crate) fn read(
             let mesh = quadric::cylinder(values.lookup, tessellation, values.report)?;
             without_cutouts(moved(mesh, to_world))
         }
+        "cone" => {
+            let mesh = revolved::cone(values.lookup, tessellation, values.report)?;
+            without_cutouts(moved(mesh, to_world))
+        }
+        "paraboloid" => {
+            let mesh = revolved::paraboloid(values.lookup, tessellation, values.report)?;
+            without_cutouts(moved(mesh, to_world))
+        }
+        "hyperboloid" => {
+            let mesh = revolved::hyperboloid(values.lookup, tessellation, values.report)?;
+            without_cutouts(moved(mesh, to_world))
+        }
+        "heightfield" => {
+            let mesh = heightfield::heightfield(values.lookup, values.report)?;
+            without_cutouts(moved(mesh, to_world))
+        }
+        "nurbs" => {
+            let mesh = nurbs::nurbs(values.lookup, values.report)?;
+            without_cutouts(moved(mesh, to_world))
+        }
         "disk" => {
             let mesh = quadric::disk(values.lookup, tessellation, values.report)?;
             without_cutouts(moved(mesh, to_world))
@@ -110,14 +134,9 @@ pub(crate) fn read(
                 true => [SUPPORTED, SUPPORTED4].concat(),
                 false => SUPPORTED.to_vec(),
             };
-            if UNSUPPORTED.contains(&name) {
-                let report = &mut values.report;
-                report.unsupported_kind(kind.span, "shape", name, &known);
-            } else {
-                let message = format!("unknown shape {name:?}");
-                let help = suggest::help(name, &known);
-                values.report.error_help(kind.span, message, help);
-            }
+            let message = format!("unknown shape {name:?}");
+            let help = suggest::help(name, &known);
+            values.report.error_help(kind.span, message, help);
             None
         }
     }

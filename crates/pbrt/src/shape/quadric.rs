@@ -30,21 +30,26 @@ impl Tessellation {
         })
     }
 
+    /// Number of rows along a meridian that is bent by less than a quarter of a turn.
+    pub fn rows(self) -> u32 {
+        self.0 / 4
+    }
+
     /// Number of segments of an angle.
-    fn segments(self, radians: f64) -> u32 {
+    pub fn segments(self, radians: f64) -> u32 {
         let turns = radians / std::f64::consts::TAU;
         ((f64::from(self.0) * turns).ceil() as u32).max(1)
     }
 }
 
-const POSITIVE: [f32; 2] = [f32::MIN_POSITIVE, f32::MAX];
+pub(super) const POSITIVE: [f32; 2] = [f32::MIN_POSITIVE, f32::MAX];
 
-fn radius(lookup: &mut Lookup, report: &mut Report) -> f64 {
+pub(super) fn radius(lookup: &mut Lookup, report: &mut Report) -> f64 {
     lookup.float_in("radius", 1.0, POSITIVE, report).into()
 }
 
 /// Reads the sweep around the z axis in radians. `None`: the angle is 0, which was reported.
-fn sweep(lookup: &mut Lookup, report: &mut Report) -> Option<f64> {
+pub(super) fn sweep(lookup: &mut Lookup, report: &mut Report) -> Option<f64> {
     let degrees = lookup.float("phimax", 360.0, report).clamp(0.0, 360.0);
     if degrees == 0.0 {
         report_empty(lookup, report);
@@ -53,7 +58,7 @@ fn sweep(lookup: &mut Lookup, report: &mut Report) -> Option<f64> {
     Some(f64::from(degrees).to_radians())
 }
 
-fn report_empty(lookup: &Lookup, report: &mut Report) {
+pub(super) fn report_empty(lookup: &Lookup, report: &mut Report) {
     let message = format!("{} has no surface", lookup.what());
     report.error(lookup.at, message);
 }

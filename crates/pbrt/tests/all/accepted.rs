@@ -621,18 +621,18 @@ fn what_pbrt_goes_on_after_is_a_warning() {
 #[test]
 fn unsupported_features_can_be_left_out() {
     let (scene, warnings) = tolerated(&format!(
-        r#"Camera "realistic" WorldBegin
-        Shape "paraboloid"
-        Shape "hyperboloid" {TRIANGLE}
-        Shape "cone"
-        Shape "nurbs"
+        r#"WorldBegin
+        Shape "hyperboloid" "point p1" [-1 0 -1] "point p2" [1 0 1]
+        Shape "hyperboloid" "point p1" [1 0 0.6] "point p2" [5 0 1] {TRIANGLE}
+        AttributeBegin Scale 1 2 1 LightSource "spot" AttributeEnd
         ObjectBegin "o" Shape "sphere" ObjectEnd
         AttributeBegin Scale 1 2 1 ObjectInstance "o" AttributeEnd
         WorldEnd"#
     ));
     assert_eq!((scene.shapes.len(), scene.instances.len()), (1, 0));
     let lines: Vec<u32> = warnings.iter().map(|warning| warning.line).collect();
-    assert_eq!(lines, [1, 2, 3, 4, 5, 7]);
+    assert_eq!(lines, [2, 3, 4, 6]);
+    assert!(scene.lights.is_empty());
     assert!(
         warnings
             .iter()

@@ -11,6 +11,7 @@
 //! - `meshes`: meshes in separate files
 //! - `mutated`: damaged copies of valid files, which must not crash the reader
 //! - `shapes`: smooth shapes
+//! - `surfaces`: height fields and rational B-spline surfaces
 //! - `shared_scenes`: scenes outside the repository, if they are present
 
 mod accepted;
@@ -26,6 +27,7 @@ mod motion;
 mod mutated;
 mod shapes;
 mod shared_scenes;
+mod surfaces;
 mod textures;
 mod version4;
 

@@ -270,3 +270,115 @@ fn what_curves_leave_out_is_noted() {
     assert!(flat.contains("flat curves are taken as cylinders"));
     assert!(split.contains("\"splitdepth\" of shape \"curve\" is left out"));
 }
+
+#[test]
+fn cones() {
+    let text = r#"Shape "cone" "float radius" 3 "float height" 4"#;
+    // The distance from the line through the apex: 3 z + 4 r = 12.
+    let off = |p: DVec3| (3.0 * p.z + 4.0 * p.truncate().length() - 12.0) / 5.0;
+    assert_surface(text, 15.0 * PI, off, 3e-4);
+    let half = format!("{text} \"float phimax\" 180");
+    assert_surface(&half, 7.5 * PI, off, 3e-4);
+    let cone = mesh(text);
+    for (i, uv) in cone.uvs.iter().enumerate() {
+        let p = point(&cone, i as u32);
+        assert!((p.z - 4.0 * f64::from(uv.y)).abs() < 1e-6);
+        let normal = cone.normals[i];
+        assert!((normal.z - 0.6).abs() < 1e-6, "{normal}");
+        if uv.y == 0.0 {
+            let out = Vec3::new(p.x as f32, p.y as f32, 0.0).normalize();
+            assert!((normal.dot(out) - 0.8).abs() < 1e-6, "{normal}");
+        }
+    }
+}
+
+#[test]
+fn paraboloids() {
+    // Radius 2 at z = 4, so z = r². The area is π / 6 ((4 z + 1)^1.5) between the ends.
+    let area = |low: f64, high: f64| {
+        let to = |z: f64| (4.0 * z + 1.0).powf(1.5);
+        PI / 6.0 * (to(high) - to(low))
+    };
+    let off = |p: DVec3| (p.truncate().length_squared() - p.z) / (1.0 + 4.0 * p.z.max(0.0)).sqrt();
+    let text =
+        |ends: &str| format!("Shape \"paraboloid\" \"float radius\" 2 \"float zmax\" 4 {ends}");
+    assert_surface(&text(""), area(0.0, 4.0), off, 4e-4);
+    assert_surface(&text("\"float zmin\" 1"), area(1.0, 4.0), off, 4e-4);
+    // Below the vertex is nothing, but v counts from zmin.
+    assert_surface(&text("\"float zmin\" -4"), area(0.0, 4.0), off, 4e-4);
+    let bowl = mesh(&text("\"float zmin\" -4"));
+    for (i, uv) in bowl.uvs.iter().enumerate() {
+        let p = point(&bowl, i as u32);
+        assert!(
+            (p.z - (8.0 * f64::from(uv.y) - 4.0)).abs() < 1e-5,
+            "{p} {uv}"
+        );
+        // The gradient of r² - z.
+        let normal = DVec3::new(2.0 * p.x, 2.0 * p.y, -1.0).normalize();
+        assert!(bowl.normals[i].as_dvec3().dot(normal) > 0.999_999);
+    }
+    // With both ends below 0 it opens downward: z = -r² here.
+    let hanging = r#"Shape "paraboloid" "float radius" 1 "float zmin" -4 "float zmax" -1"#;
+    let off = |p: DVec3| off(DVec3::new(p.x, p.y, -p.z));
+    assert_surface(hanging, area(1.0, 4.0), off, 4e-4);
+}
+
+#[test]
+fn hyperboloids() {
+    // A line that is symmetric about z = 0: r² = 1 + z².
+    let text = r#"Shape "hyperboloid" "point p1" [1 -1 -1] "point p2" [1 1 1]"#;
+    let off = |p: DVec3| {
+        let slope = 2.0 * p.length();
+        (p.truncate().length_squared() - 1.0 - p.z * p.z) / slope
+    };
+    // 2 π ∫ sqrt(1 + 2 z²) dz from -1 to 1.
+    let area = 2.0 * PI * (3.0_f64.sqrt() + 2.0_f64.sqrt().asinh() / 2.0_f64.sqrt());
+    assert_surface(text, area, off, 2.0_f64.sqrt() * 3e-4);
+    let whole = mesh(text);
+    for (i, uv) in whole.uvs.iter().enumerate() {
+        let p = point(&whole, i as u32);
+        assert!((p.z - (2.0 * f64::from(uv.y) - 1.0)).abs() < 1e-6);
+        let normal = DVec3::new(p.x, p.y, -p.z).normalize();
+        assert!(whole.normals[i].as_dvec3().dot(normal) > 0.999_999);
+    }
+    // Other lines: the circles of the end and of twice as far are on the surface, as in pbrt-v3. Here r² of these is
+    // 1.64 at 1.4 and 4.36 at 2.8.
+    let growth = (4.36 - 1.64) / (2.8 * 2.8 - 1.4 * 1.4);
+    let mesh = mesh(r#"Shape "hyperboloid" "point p1" [1 0 0] "point p2" [.8 1 1.4]"#);
+    for i in 0..mesh.positions.len() {
+        let p = point(&mesh, i as u32);
+        let expected = 1.64 + growth * (p.z * p.z - 1.96);
+        assert!((p.truncate().length_squared() - expected).abs() < 1e-3);
+    }
+    // The default is a cone. Its apex is at p1.
+    let cone = |p: DVec3| (p.truncate().length() - 2.0_f64.sqrt() * p.z) / 3.0_f64.sqrt();
+    assert_surface(r#"Shape "hyperboloid""#, 6.0_f64.sqrt() * PI, cone, 3e-4);
+}
+
+#[test]
+fn surfaces_of_revolution_that_are_none() {
+    for (text, expected) in [
+        (r#""cone" "float height" 0"#, "\"height\" must be positive"),
+        (r#""paraboloid" "float zmin" 1"#, "no surface"),
+        (
+            r#""paraboloid" "float zmin" -1 "float zmax" 0"#,
+            "no surface",
+        ),
+        (
+            r#""hyperboloid" "point p1" [1 0 0] "point p2" [2 0 0]"#,
+            "no surface",
+        ),
+        (
+            r#""hyperboloid" "point p1" [-1 0 -1] "point p2" [1 0 1]"#,
+            "crosses the axis",
+        ),
+        (
+            r#""hyperboloid" "point p1" [1 0 0.6] "point p2" [5 0 1]"#,
+            "with gaps",
+        ),
+    ] {
+        let error = load_text(&format!("WorldBegin Shape {text} WorldEnd")).err();
+        let error = error.unwrap_or_else(|| panic!("{text}")).to_string();
+        assert!(error.contains(expected), "{text}: {error}");
+    }
+}

@@ -1,0 +1,56 @@
+//! Height fields: a mesh over the unit square.
+
+use antumbra_scene::TriangleMesh;
+use glam::{DVec3, Vec2};
+
+use crate::lookup::Lookup;
+use crate::params::{ParamType, Values};
+use crate::report::Report;
+use crate::shape::grid;
+
+/// Most heights along a side, so that vertices can be numbered by 32 bits.
+const MAX_SIDE: u32 = 1 << 16;
+
+/// Reads a `heightfield`. Its mesh has no normals, as in pbrt-v3. `None`: a mistake was reported.
+pub(super) fn heightfield(lookup: &mut Lookup, report: &mut Report) -> Option<TriangleMesh> {
+    let errors_before = report.error_count();
+    let [nu, nv] = ["nu", "nv"].map(|name| {
+        if lookup.find(name, &[ParamType::Integer]).is_none() {
+            lookup.report_missing(name, "integer", report);
+        }
+        lookup.integer_in(name, 2, [2, MAX_SIDE], report)
+    });
+    let heights = lookup.find("Pz", &[ParamType::Float]);
+    if heights.is_none() {
+        lookup.report_missing("Pz", "float", report);
+    }
+    let heights = heights?;
+    let Values::Floats(values) = &heights.values else {
+        return None;
+    };
+    if report.error_count() > errors_before {
+        return None;
+    }
+    let wanted = u64::from(nu) * u64::from(nv);
+    if values.len() as u64 != wanted {
+        let found = values.len();
+        let message = format!("\"Pz\" has {found} values, but nu x nv is {nu} x {nv} = {wanted}");
+        report.error(heights.list, message);
+        return None;
+    }
+    if let Some(index) = values.iter().position(|z| !z.is_finite()) {
+        let span = heights.value_span(index, report);
+        report.error(
+            span,
+            format!("\"Pz\" must be finite, found {}", values[index]),
+        );
+        return None;
+    }
+    let mut mesh = grid::mesh([nu - 1, nv - 1], |u, v| (DVec3::new(u, v, 0.0), DVec3::Z));
+    mesh.normals.clear();
+    for (position, z) in mesh.positions.iter_mut().zip(values) {
+        position[2] = *z;
+    }
+    debug_assert_eq!(mesh.uvs[0], Vec2::ZERO);
+    Some(mesh)
+}

@@ -1,0 +1,235 @@
+//! Rational B-spline surfaces (NURBS), diced to 30 x 30 vertices as in pbrt-v3.
+
+use antumbra_scene::TriangleMesh;
+use glam::{DVec3, DVec4, Vec2};
+
+use crate::lookup::Lookup;
+use crate::params::{Param, ParamType, Values};
+use crate::report::Report;
+use crate::shape::grid;
+
+/// Vertices along a side.
+const DICED: u32 = 30;
+/// Largest order, which bounds the time of a vertex.
+const MAX_ORDER: u32 = 64;
+/// Most control points along a side.
+const MAX_POINTS: u32 = 1 << 16;
+
+/// B-spline basis along one side.
+struct Basis {
+    order: usize,
+    knots: Vec<f64>,
+    /// Part of the parameter that is diced.
+    range: [f64; 2],
+    points: usize,
+}
+
+/// Names of the parameters of a side: number of points, order, knots, and the ends of the part.
+type Names = [&'static str; 5];
+const U: Names = ["nu", "uorder", "uknots", "u0", "u1"];
+const V: Names = ["nv", "vorder", "vknots", "v0", "v1"];
+
+impl Basis {
+    /// Reads the parameters of a side. `None`: a mistake was reported.
+    fn read(
+        lookup: &mut Lookup,
+        [points, order, knots, start, end]: Names,
+        report: &mut Report,
+    ) -> Option<Self> {
+        let errors_before = report.error_count();
+        for name in [points, order] {
+            if lookup.find(name, &[ParamType::Integer]).is_none() {
+                lookup.report_missing(name, "integer", report);
+            }
+        }
+        let order_name = order;
+        let count = lookup.integer_in(points, 2, [2, MAX_POINTS], report) as usize;
+        let order = lookup.integer_in(order, 2, [2, MAX_ORDER], report) as usize;
+        let param = lookup.find(knots, &[ParamType::Float]);
+        if param.is_none() {
+            lookup.report_missing(knots, "float", report);
+        }
+        let param = param?;
+        let Values::Floats(values) = &param.values else {
+            return None;
+        };
+        if report.error_count() > errors_before {
+            return None;
+        }
+        if count < order {
+            let message = format!("{points:?} is {count}, less than {order_name:?}, {order}");
+            report.error(lookup.at, message);
+            return None;
+        }
+        if values.len() != count + order {
+            let wanted = format!("{points:?} + {order_name:?} = {count} + {order}");
+            let message = format!("{knots:?} has {} values, not {wanted}", values.len());
+            report.error(param.list, message);
+            return None;
+        }
+        let descends = |pair: &[f32]| !(pair[0] <= pair[1] && (pair[1] - pair[0]).is_finite());
+        if let Some(index) = values.windows(2).position(descends) {
+            let span = param.value_span(index + 1, report);
+            let message = format!("{knots:?} must not descend, found {}", values[index + 1]);
+            report.error(span, message);
+            return None;
+        }
+        let limits = [values[order - 1], values[count]];
+        let range = [
+            lookup.float_in(start, limits[0], limits, report),
+            lookup.float_in(end, limits[1], limits, report),
+        ];
+        if report.error_count() > errors_before {
+            return None;
+        }
+        if range[0] == range[1] {
+            let message = format!("{} has no surface: {start:?} equals {end:?}", lookup.what());
+            report.error(lookup.at, message);
+            return None;
+        }
+        Some(Self {
+            order,
+            knots: values.iter().copied().map(f64::from).collect(),
+            range: range.map(f64::from),
+            points: count,
+        })
+    }
+
+    fn parameter(&self, share: f64) -> f64 {
+        let [start, end] = self.range;
+        start + share * (end - start)
+    }
+
+    /// First of the control points that count at a parameter, and the weights of all of them with their derivatives.
+    fn weights(&self, t: f64) -> (usize, Vec<[f64; 2]>) {
+        let knots = &self.knots;
+        let is_span = |&s: &usize| t <= knots[s + 1] && knots[s] < knots[s + 1];
+        let span = (self.order - 1..self.points).find(is_span);
+        let span = span.unwrap_or(self.points - 1);
+        // Cox and de Boor: each degree from the one below.
+        let ratio = |a: f64, b: f64| if b == 0.0 { 0.0 } else { a / b };
+        let mut values = vec![1.0];
+        let mut below = Vec::new();
+        for degree in 1..self.order {
+            below = values;
+            values = vec![0.0; degree + 1];
+            for (index, value) in below.iter().enumerate() {
+                let [low, high] = [knots[span + 1 + index - degree], knots[span + 1 + index]];
+                let share = ratio(t - low, high - low);
+                values[index] += (1.0 - share) * value;
+                values[index + 1] += share * value;
+            }
+        }
+        let degree = self.order - 1;
+        let mut slopes = vec![0.0; self.order];
+        for (index, value) in below.iter().enumerate() {
+            let [low, high] = [knots[span + 1 + index - degree], knots[span + 1 + index]];
+            let slope = ratio(degree as f64 * value, high - low);
+            slopes[index] -= slope;
+            slopes[index + 1] += slope;
+        }
+        let both = values.into_iter().zip(slopes).map(|(v, s)| [v, s]);
+        (span - degree, both.collect())
+    }
+}
+
+/// Reads the control points "P", or "Pw" with their weights. `None`: a mistake was reported.
+fn control_points(lookup: &mut Lookup, wanted: usize, report: &mut Report) -> Option<Vec<DVec4>> {
+    let plain = lookup.find("P", &[ParamType::Point3]);
+    let weighted = lookup.find("Pw", &[ParamType::Float]);
+    let (param, points): (&Param, Vec<DVec4>) = match (plain, weighted) {
+        (Some(_), Some(_)) => {
+            report.error(lookup.at, "\"P\" and \"Pw\" are both given; remove one");
+            return None;
+        }
+        (None, None) => {
+            if !lookup.has("Pw") {
+                lookup.report_missing("P", "point", report);
+            }
+            return None;
+        }
+        (Some(param), None) => match &param.values {
+            Values::Points(values) => {
+                let points = values.chunks_exact(3);
+                (
+                    param,
+                    points.map(|p| DVec3::from_slice(p).extend(1.0)).collect(),
+                )
+            }
+            _ => return None,
+        },
+        (None, Some(param)) => match &param.values {
+            Values::Floats(values) => {
+                if !values.len().is_multiple_of(4) {
+                    let message = format!("{} values of \"Pw\" do not make points", values.len());
+                    report.error_help(param.list, message, "a point has x, y, z and a weight");
+                    return None;
+                }
+                let points = values.chunks_exact(4);
+                let point = |p: &[f32]| DVec4::from([0, 1, 2, 3].map(|k| f64::from(p[k])));
+                (param, points.map(point).collect())
+            }
+            _ => return None,
+        },
+    };
+    if points.len() != wanted {
+        let message = format!(
+            "found {} control points, but nu x nv is {wanted}",
+            points.len()
+        );
+        report.error(param.list, message);
+        return None;
+    }
+    Some(points)
+}
+
+/// Reads a `nurbs`. Texture coordinates are the parameters. `None`: a mistake was reported.
+pub(super) fn nurbs(lookup: &mut Lookup, report: &mut Report) -> Option<TriangleMesh> {
+    let bases = [U, V].map(|names| Basis::read(lookup, names, report));
+    let [Some(along_u), Some(along_v)] = bases else {
+        lookup.ignore_all();
+        return None;
+    };
+    let wanted = along_u.points * along_v.points;
+    let points = control_points(lookup, wanted, report)?;
+    let cells = DICED - 1;
+    let mut is_surface = true;
+    let share = |index: u32| f64::from(index) / f64::from(cells);
+    let mut vertices = Vec::new();
+    for v in 0..DICED {
+        let (first_v, weights_v) = along_v.weights(along_v.parameter(share(v)));
+        for u in 0..DICED {
+            let (first_u, weights_u) = along_u.weights(along_u.parameter(share(u)));
+            let [mut at, mut by_u, mut by_v] = [DVec4::ZERO; 3];
+            for (j, [value_v, slope_v]) in weights_v.iter().enumerate() {
+                for (i, [value_u, slope_u]) in weights_u.iter().enumerate() {
+                    let point = points[(first_v + j) * along_u.points + first_u + i];
+                    at += point * (value_u * value_v);
+                    by_u += point * (slope_u * value_v);
+                    by_v += point * (value_u * slope_v);
+                }
+            }
+            let position = at.truncate() / at.w;
+            let slope = |by: DVec4| (by.truncate() - position * by.w) / at.w;
+            is_surface &= position.is_finite();
+            vertices.push((position, slope(by_u).cross(slope(by_v))));
+        }
+    }
+    if !is_surface {
+        let message = "the weights of \"Pw\" add up to 0 somewhere on the surface";
+        report.error(lookup.at, message);
+        return None;
+    }
+    let index = |share: f64| (share * f64::from(cells)).round() as usize;
+    let mut mesh = grid::mesh([cells; 2], |u, v| {
+        vertices[index(v) * DICED as usize + index(u)]
+    });
+    for uv in &mut mesh.uvs {
+        let [u, v] = [
+            along_u.parameter(uv.x.into()),
+            along_v.parameter(uv.y.into()),
+        ];
+        *uv = Vec2::new(u as f32, v as f32);
+    }
+    Some(mesh)
+}
