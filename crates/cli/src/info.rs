@@ -200,6 +200,7 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
                 Projection::Orthographic => "orthographic",
                 Projection::Spherical => "spherical",
                 Projection::EqualArea => "equalarea",
+                Projection::Realistic => "realistic",
             },
             fov_degrees: (scene.camera.projection == Projection::Perspective)
                 .then_some(scene.camera.fov),

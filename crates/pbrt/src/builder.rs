@@ -52,6 +52,8 @@ pub(crate) struct Builder<'o> {
     refused_blocks: usize,
     camera: Camera,
     film: Film,
+    /// Diagonal of the film in millimetres, if it is given, and its place.
+    film_diagonal: Option<(f32, Span)>,
     filter: Filter,
     sampler: Sampler,
     integrator: Integrator,
@@ -108,6 +110,7 @@ impl<'o> Builder<'o> {
             refused_blocks: 0,
             camera: Camera::default(),
             film: Film::default(),
+            film_diagonal: None,
             filter: Filter::default(),
             sampler: settings::DEFAULT_SAMPLER,
             integrator: Integrator::default(),
@@ -158,6 +161,7 @@ impl<'o> Builder<'o> {
             self.finish_version4(report);
         }
         self.check_media(end, report);
+        self.fit_lenses(end, report);
         let meshes = self.pending_meshes;
         let times = Times {
             meshes: meshes.read(
@@ -243,7 +247,9 @@ impl Handler for Builder<'_> {
             D::ActiveTransform(active) => self.transforms().active = active,
             D::TransformTimes(times) => self.transform_times(at, times, report),
             D::Camera(kind, params) => self.camera(at, &kind, &params, report),
-            D::Film(kind, params) => self.film = film::declare(at, &kind, &params, report),
+            D::Film(kind, params) => {
+                (self.film, self.film_diagonal) = film::declare(at, &kind, &params, report);
+            }
             D::PixelFilter(kind, params) => {
                 self.filter = film::declare_filter(at, &kind, &params, report);
             }

@@ -1,4 +1,8 @@
 //! Directive for the camera, with the parameters and defaults of pbrt-v3.
+//!
+//! - `lens`: cameras with lens systems
+
+mod lens;
 
 use antumbra_scene::{Camera, Projection};
 use glam::{DMat4, DVec3, DVec4, Mat3A, Mat4};
@@ -12,10 +16,10 @@ use crate::state::{MIRRORS, MIRRORS_HELP, Transforms};
 use crate::{suggest, transform};
 
 /// Supported cameras.
-pub(crate) const SUPPORTED: &[&str] = &["environment", "orthographic", "perspective"];
+pub(crate) const SUPPORTED: &[&str] = &["environment", "orthographic", "perspective", "realistic"];
 
-/// Cameras of pbrt-v3 that are not supported.
-pub(crate) const UNSUPPORTED: &[&str] = &["realistic"];
+/// Supported cameras of pbrt-v4.
+const SUPPORTED4: &[&str] = &["environment", "orthographic", "perspective", "spherical"];
 
 /// Handles `Camera`. Returns the camera, which is measured from `origin`, and, in double precision, camera to world space at
 /// the start and at the end of the exposure.
@@ -70,15 +74,20 @@ pub(crate) fn declare(
                 report,
             );
         }
-        name if UNSUPPORTED.contains(&name) => {
-            report.unsupported_kind(kind.span, "camera", name, SUPPORTED);
+        "realistic" if report.is_version4 => {
+            report.unsupported_kind(kind.span, "camera", "realistic", SUPPORTED4);
             lookup.ignore_all();
         }
+        "realistic" => camera = lens::realistic(&mut lookup, report),
         name => {
+            let known = match report.is_version4 {
+                true => SUPPORTED4,
+                false => SUPPORTED,
+            };
             report.error_help(
                 kind.span,
                 format!("unknown camera {name:?}"),
-                suggest::help(name, SUPPORTED),
+                suggest::help(name, known),
             );
             lookup.ignore_all();
         }
@@ -146,18 +155,7 @@ fn perspective(lookup: &mut Lookup, report: &mut Report) -> Camera {
 /// Shutter, screen window and lens, which cameras share.
 fn plane(lookup: &mut Lookup, report: &mut Report) -> Camera {
     let defaults = Camera::default();
-    let mut shutter = [
-        lookup.float("shutteropen", defaults.shutter[0], report),
-        lookup.float("shutterclose", defaults.shutter[1], report),
-    ];
-    // In version 4 they were refused with the exposure.
-    if shutter[1] < shutter[0] && !report.is_version4 {
-        report.note(
-            lookup.at,
-            "the shutter closes before it opens: the times are exchanged",
-        );
-        shutter.reverse();
-    }
+    let shutter = shutter(lookup, report);
     let screen_window = lookup.floats::<4>("screenwindow", report);
     if let Some(window @ [x0, x1, y0, y1]) = screen_window
         && (x0 == x1 || y0 == y1)
@@ -181,4 +179,22 @@ fn plane(lookup: &mut Lookup, report: &mut Report) -> Camera {
         ),
         ..defaults
     }
+}
+
+/// Times at which the shutter opens and closes.
+fn shutter(lookup: &mut Lookup, report: &mut Report) -> [f32; 2] {
+    let [open, close] = Camera::default().shutter;
+    let mut shutter = [
+        lookup.float("shutteropen", open, report),
+        lookup.float("shutterclose", close, report),
+    ];
+    // In version 4 they were refused with the exposure.
+    if shutter[1] < shutter[0] && !report.is_version4 {
+        report.note(
+            lookup.at,
+            "the shutter closes before it opens: the times are exchanged",
+        );
+        shutter.reverse();
+    }
+    shutter
 }

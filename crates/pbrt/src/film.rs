@@ -9,10 +9,15 @@ use crate::report::Report;
 use crate::source::Span;
 use crate::suggest;
 
-/// Handles `Film`.
-pub(crate) fn declare(at: Span, kind: &Quoted, params: &Params, report: &mut Report) -> Film {
+/// Handles `Film`. Returns the film, and its diagonal in millimetres with its place, where it is given.
+pub(crate) fn declare(
+    at: Span,
+    kind: &Quoted,
+    params: &Params,
+    report: &mut Report,
+) -> (Film, Option<(f32, Span)>) {
     let mut lookup = Lookup::new(at, format!("film {:?}", kind.text), params);
-    let mut film = Film::default();
+    let mut film = (Film::default(), None);
     if kind.text == "image" {
         film = image(&mut lookup, report);
     } else {
@@ -27,7 +32,7 @@ pub(crate) fn declare(at: Span, kind: &Quoted, params: &Params, report: &mut Rep
     film
 }
 
-fn image(lookup: &mut Lookup, report: &mut Report) -> Film {
+fn image(lookup: &mut Lookup, report: &mut Report) -> (Film, Option<(f32, Span)>) {
     let defaults = Film::default();
     let [width, height] = defaults.resolution;
     let resolution = [
@@ -44,12 +49,9 @@ fn image(lookup: &mut Lookup, report: &mut Report) -> Film {
             ),
         );
     }
-    lookup.left_out(
-        "diagonal",
-        &[ParamType::Float],
-        "only a realistic lens needs the film's size",
-        report,
-    );
+    let diagonal_at = lookup.find("diagonal", &[ParamType::Float]);
+    let positive = [f32::MIN_POSITIVE, f32::MAX];
+    let diagonal = lookup.float_in("diagonal", 35.0, positive, report);
     let film = Film {
         resolution,
         crop_window: crop_window(lookup, report),
@@ -70,7 +72,7 @@ fn image(lookup: &mut Lookup, report: &mut Report) -> Film {
             "a crop window is [x_min x_max y_min y_max] in fractions of the picture",
         );
     }
-    film
+    (film, diagonal_at.map(|param| (diagonal, param.declaration)))
 }
 
 /// Reads the crop window: each pair in either order, limited to the picture, as in pbrt-v3.

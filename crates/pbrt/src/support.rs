@@ -21,7 +21,7 @@ const GROUPS: &[Group] = &[
     Group {
         heading: "Cameras",
         supported: camera::SUPPORTED,
-        unsupported: camera::UNSUPPORTED,
+        unsupported: &[],
         scene: r#"Camera "NAME" WorldBegin WorldEnd"#,
     },
     Group {

@@ -67,6 +67,12 @@ pub enum Error {
         /// Description of the mistake.
         reason: &'static str,
     },
+    /// The lenses of the camera make no picture.
+    #[error("the lens system cannot be used: {reason}")]
+    Lens {
+        /// Description of the mistake.
+        reason: String,
+    },
     /// A participating medium cannot be used.
     #[error("medium {index} cannot be used: {reason}")]
     Medium {

@@ -1,5 +1,7 @@
 //! Camera: position, projection, field of view and lens.
 
+use std::sync::Arc;
+
 use glam::Mat4;
 use serde::Serialize;
 
@@ -31,6 +33,8 @@ pub struct Camera {
     pub lens_radius: f32,
     /// Distance of the plane in focus along z, in scene units. Ignored for a pinhole.
     pub focal_distance: f32,
+    /// Lenses of [`Projection::Realistic`], whose size is in the metres of camera space. `None` for other cameras.
+    pub lenses: Option<Arc<LensSystem>>,
     /// Index into [`Scene::media`](crate::Scene::media) of the medium around the camera. `None` is vacuum.
     pub medium: Option<u32>,
 }
@@ -47,6 +51,8 @@ pub enum Projection {
     Spherical,
     /// All directions on an octahedron of equal areas, whose middle is y.
     EqualArea,
+    /// Through the lenses of the camera onto a film. Field of view, screen window and thin lens count for nothing.
+    Realistic,
 }
 
 impl Projection {
@@ -54,6 +60,32 @@ impl Projection {
     pub fn is_all_around(self) -> bool {
         matches!(self, Self::Spherical | Self::EqualArea)
     }
+}
+
+/// System of spherical lenses in front of a film.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LensSystem {
+    /// Surfaces from the scene to the film. The distance of the last from the film is adjusted to focus.
+    pub elements: Vec<LensElement>,
+    /// Distance of the film from what is in focus, in metres.
+    pub focus_distance: f32,
+    /// Diagonal of the film in millimetres.
+    pub film_diagonal: f32,
+    /// Time of exposure, as which light is added up. `None` weights light relative to the middle of the film.
+    pub exposure: Option<f32>,
+}
+
+/// Surface of a [`LensSystem`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct LensElement {
+    /// Radius of curvature in millimetres, positive if the surface bulges towards the scene. 0 is the aperture stop.
+    pub radius: f32,
+    /// Distance from the next surface towards the film, in millimetres.
+    pub thickness: f32,
+    /// Index of refraction behind the surface. 0 counts as 1.
+    pub eta: f32,
+    /// Diameter of the opening in millimetres.
+    pub diameter: f32,
 }
 
 impl Default for Camera {
@@ -68,6 +100,7 @@ impl Default for Camera {
             frame_aspect_ratio: None,
             lens_radius: 0.0,
             focal_distance: 1e6,
+            lenses: None,
             medium: None,
         }
     }

@@ -49,7 +49,7 @@ pub mod shape;
 pub mod texture;
 pub mod transform;
 
-pub use camera::{Camera, Projection};
+pub use camera::{Camera, LensElement, LensSystem, Projection};
 pub use disney::{Disney, DisneyBody};
 pub use film::{Film, Filter};
 pub use flatten::{Error, MAX_FLAT_TRIANGLES};

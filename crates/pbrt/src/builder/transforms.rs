@@ -1,5 +1,7 @@
 //! The current transformations, and the camera, which takes them.
 
+use std::sync::Arc;
+
 use glam::DMat4;
 
 use super::Builder;
@@ -67,5 +69,26 @@ impl Builder<'_> {
             self.camera.medium = self.medium(1, report);
         }
         self.coordinate_systems.insert("camera".into(), places);
+    }
+
+    /// Gives lenses the size of their film, which other cameras have no use for.
+    pub(super) fn fit_lenses(&mut self, end: Span, report: &mut Report) {
+        match (&mut self.camera.lenses, self.film_diagonal) {
+            (Some(lenses), diagonal) => {
+                if let Some((diagonal, _)) = diagonal {
+                    Arc::make_mut(lenses).film_diagonal = diagonal;
+                }
+                if self.film.max_sample_luminance.is_finite() {
+                    let message = "\"maxsampleluminance\" limits light as the lens weights it, where pbrt-v3 \
+                                   limits it before";
+                    report.note(end, message);
+                }
+            }
+            (None, Some((_, at))) => {
+                let message = "\"diagonal\" of the film is left out: only a realistic lens needs the film's size";
+                report.note(at, message);
+            }
+            (None, None) => {}
+        }
     }
 }

@@ -82,7 +82,8 @@ WorldBegin WorldEnd"#, r#"16 numbers in [ ]"#),
         // Names.
         (r#"Sampler ›"magic" WorldBegin WorldEnd"#, r#"known: 02sequence, halton"#),
         (r#"Integrator ›"paht" WorldBegin WorldEnd"#, r#"did you mean "path""#),
-        (r#"Camera ›"realistic" WorldBegin WorldEnd"#, r#"not supported yet"#),
+        (r#"›Camera "realistic" WorldBegin WorldEnd"#, r#"needs a parameter "lensfile""#),
+        (r#"Film "rgb" Camera ›"realistic" WorldBegin"#, r#"not supported yet"#),
         (r#"Accelerator "qbvh" "string order" ›"random" WorldBegin WorldEnd"#, r#"known: simple, sort+"#),
         (r#"Accelerator "bvh" ›"string order" "simple" WorldBegin WorldEnd"#, r#"no parameter "order""#),
         (r#"WorldBegin Material "hair" ›Shape "sphere" WorldEnd"#, r#"hair on other shapes"#),
@@ -280,7 +281,7 @@ fn kinds_that_are_not_supported_come_with_those_that_are() {
     let help = help.unwrap_or_default();
     assert_eq!(
         help,
-        "supported: environment, orthographic, perspective"
+        "supported: environment, orthographic, perspective, spherical"
     );
 }
 

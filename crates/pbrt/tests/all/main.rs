@@ -4,6 +4,7 @@
 //! - `broken`: broken files, and the place and words of each message
 //! - `includes`: includes, cycles and limits
 //! - `instances`: objects and instances
+//! - `lenses`: cameras with lens systems
 //! - `lights`: lights with images
 //! - `limits`: scenes that demand too much
 //! - `materials`, `textures`: materials, textures and alpha masks
@@ -18,6 +19,7 @@ mod accepted;
 mod broken;
 mod includes;
 mod instances;
+mod lenses;
 mod lights;
 mod limits;
 mod materials;

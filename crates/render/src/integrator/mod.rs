@@ -63,6 +63,8 @@ pub struct Batch {
     pub step: f32,
     /// Position of every sample inside its pixel. Integrators ignore it.
     pub inside: Vec<[f32; 2]>,
+    /// Factor of the light of every sample. Empty where all are 1.
+    weights: Vec<f32>,
     /// Light of paths, shadow rays and probes. Three sums, so that the order of additions does not depend on when a
     /// queue is traced.
     emitted: Vec<Vec3>,
@@ -105,6 +107,7 @@ impl Batch {
         self.streams.clear();
         self.inside.clear();
         self.times.clear();
+        self.weights.clear();
     }
 
     /// The camera of the world at the time of a sample, if the camera moves.
@@ -124,15 +127,18 @@ impl Batch {
             [0.0; 2]
         };
         let film = [x as f32 + dx, y as f32 + dy];
-        let ray = match camera.has_time() {
-            false => camera.ray(film, lens),
+        let (ray, weight) = match camera.has_time() {
+            false => camera.weighted_ray(film, lens),
             true => {
                 let time = camera.time(stream.uniform(dimension::TIME));
                 self.times.push(time);
                 let moved = camera.at(time);
-                moved.as_ref().unwrap_or(camera).ray(film, lens)
+                moved.as_ref().unwrap_or(camera).weighted_ray(film, lens)
             }
         };
+        if camera.has_weights() {
+            self.weights.push(weight);
+        }
         self.rays.push(ray);
         self.streams.push(stream);
         self.inside.push([dx, dy]);
@@ -150,9 +156,15 @@ impl Batch {
         }
     }
 
-    /// Radiance along ray `index`.
+    /// Radiance along ray `index`, times its weight.
     pub fn radiance(&self, index: usize) -> Vec3 {
-        self.emitted[index] + self.reflected[index] + self.probed[index]
+        let light = self.emitted[index] + self.reflected[index] + self.probed[index];
+        match self.weights.get(index) {
+            None => light,
+            // A blocked ray brings nothing, whatever is beyond.
+            Some(&0.0) => Vec3::ZERO,
+            Some(weight) => light * weight,
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Camera rays: from a point on the film to a ray in the world.
 
 use std::f32::consts::{PI, TAU};
+use std::sync::Arc;
 
 use antumbra::{MovingInstance, Ray};
 use antumbra_scene::{Film, Projection};
@@ -10,6 +11,7 @@ use crate::Error;
 use crate::light::{longitude_latitude, octahedron};
 use crate::sampler::warp::disk;
 use crate::surface::affine;
+use crate::world::lens::{HalfLine, Lens};
 use crate::world::rows;
 
 /// A camera, ready to make rays.
@@ -28,6 +30,8 @@ pub struct Camera {
     step: [f32; 2],
     lens_radius: f32,
     focal_distance: f32,
+    /// Lenses and film of a realistic camera.
+    lens: Option<Arc<Lens>>,
     medium: Option<u32>,
     /// Keys of the camera, if it moves: from its space to the world.
     path: Option<MovingInstance>,
@@ -43,6 +47,7 @@ impl Camera {
     /// # Errors
     /// [`Error::FieldOfView`] unless the field of view lies strictly between 0 and 180 degrees.
     /// [`Error::CameraMatrix`] if the matrix is not finite or flattens space.
+    /// [`Error::Lens`] if a realistic camera has no lenses, or some through which no light passes.
     pub fn new(camera: &antumbra_scene::Camera, film: &Film) -> Result<Self, Error> {
         let fov = camera.fov;
         if camera.projection == Projection::Perspective && !(fov > 0.0 && fov < 180.0) {
@@ -64,6 +69,14 @@ impl Camera {
             Projection::Perspective => libm::tan(f64::from(fov).to_radians() / 2.0) as f32,
             _ => 1.0,
         };
+        let lens = match (camera.projection, &camera.lenses) {
+            (Projection::Realistic, Some(system)) => Some(Arc::new(Lens::new(system, film)?)),
+            (Projection::Realistic, None) => {
+                let reason = "it is missing".to_owned();
+                return Err(Error::Lens { reason });
+            }
+            _ => None,
+        };
         Ok(Self {
             world_from_camera: matrix,
             eye: matrix.project_point3(Vec3::ZERO),
@@ -75,11 +88,12 @@ impl Camera {
                 scale * (x_max - x_min) / width,
                 scale * (y_min - y_max) / height,
             ],
-            lens_radius: match camera.projection.is_all_around() {
-                true => 0.0,
-                false => camera.lens_radius,
+            lens_radius: match camera.projection {
+                Projection::Perspective | Projection::Orthographic => camera.lens_radius,
+                Projection::Spherical | Projection::EqualArea | Projection::Realistic => 0.0,
             },
             focal_distance: camera.focal_distance,
+            lens,
             medium: camera.medium,
             path: path(camera)?,
             shutter: camera.shutter,
@@ -119,13 +133,51 @@ impl Camera {
             camera_from_world: matrix.inverse(),
             eye: matrix.project_point3(Vec3::ZERO),
             path: None,
+            lens: self.lens.clone(),
             ..*self
         })
     }
 
     /// Ray of film point (x, y), in pixels from the top left corner, through the lens point that `lens` in
-    /// `[0, 1)²` chooses. The direction has unit length.
+    /// `[0, 1)²` chooses. The direction has unit length. A ray that lenses block hits nothing.
     pub fn ray(&self, film: [f32; 2], lens: [f32; 2]) -> Ray {
+        self.weighted_ray(film, lens).0
+    }
+
+    /// [`Self::ray`] with its weight: 1, but of a realistic camera. A ray that lenses block has weight 0.
+    pub fn weighted_ray(&self, film: [f32; 2], lens: [f32; 2]) -> (Ray, f32) {
+        let Some(lenses) = &self.lens else {
+            return (self.plain_ray(film, lens), 1.0);
+        };
+        let share = [0, 1].map(|axis| f64::from(film[axis]) / f64::from(self.size[axis]));
+        match lenses.leaving(share, lens) {
+            Some(leaving) => (self.behind_lenses(leaving.ray), leaving.weight),
+            None => {
+                let blocked = self.ray_from(self.eye, Vec3::Z);
+                (
+                    Ray {
+                        tfar: 0.0,
+                        ..blocked
+                    },
+                    0.0,
+                )
+            }
+        }
+    }
+
+    /// World ray of a ray that leaves the lenses.
+    fn behind_lenses(&self, ray: HalfLine) -> Ray {
+        self.to_world(ray.org.as_vec3(), ray.dir.as_vec3())
+    }
+
+    /// Whether rays differ in weight.
+    #[inline]
+    pub fn has_weights(&self) -> bool {
+        self.lens.is_some()
+    }
+
+    /// Ray of a camera without lenses.
+    fn plain_ray(&self, film: [f32; 2], lens: [f32; 2]) -> Ray {
         if self.projection.is_all_around() {
             return self.ray_from(self.eye, self.direction(film));
         }
@@ -183,7 +235,7 @@ impl Camera {
     /// Whether rays depend on the lens point.
     #[inline]
     pub fn has_lens(&self) -> bool {
-        self.lens_radius > 0.0
+        self.lens_radius > 0.0 || self.lens.is_some()
     }
 
     /// Rays of film points `distance` pixels further along x and along y, through the lens point of `ray`.
@@ -194,6 +246,25 @@ impl Camera {
             let [x, y] = self.film(dir);
             return [[x + distance, y], [x, y + distance]]
                 .map(|film| self.ray_from(self.eye, self.direction(film)));
+        }
+        if let Some(lenses) = &self.lens {
+            let local = HalfLine {
+                org: org.as_dvec3(),
+                dir: dir.as_dvec3().normalize(),
+            };
+            let [x, y] = self.size.map(|size| f64::from(distance / size));
+            return [[x, 0.0], [0.0, y]].map(|further| {
+                let found = lenses.neighbour(local, further);
+                // At the edge of a lens, the other neighbour is as far.
+                let mirrored = || {
+                    let opposite = lenses.neighbour(local, further.map(|share| -share))?;
+                    Some(HalfLine {
+                        org: local.org * 2.0 - opposite.org,
+                        dir: local.dir * 2.0 - opposite.dir.normalize(),
+                    })
+                };
+                self.behind_lenses(found.or_else(mirrored).unwrap_or(local))
+            });
         }
         if self.projection == Projection::Orthographic {
             let [x, y] = self.step.map(|step| step * distance);

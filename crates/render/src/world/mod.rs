@@ -8,6 +8,7 @@
 mod camera;
 mod check;
 mod geometry;
+mod lens;
 
 use std::ops::Deref;
 use std::sync::{Arc, OnceLock};
