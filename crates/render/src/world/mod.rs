@@ -3,7 +3,7 @@
 //! - [`World`]: everything that a rendering needs of a scene
 //! - `check.rs`: scenes that are refused
 //! - `geometry.rs`: shapes and instances for the kernel
-//! - `camera.rs`: camera rays
+//! - `camera.rs`: camera rays, through the lenses of `lens.rs` where it has some
 
 mod camera;
 mod check;
