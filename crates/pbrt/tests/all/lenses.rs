@@ -84,15 +84,12 @@ fn broken_lens_files() {
             "line 1: an index of refraction of -1 is negative",
         ),
     ] {
-        let error = with_lens("", "", lens)
-            .err()
-            .expect("a mistake")
-            .to_string();
+        let error = with_lens("", "", lens).expect_err("a mistake").to_string();
         assert!(error.contains(expected), "{expected}: {error}");
         assert!(error.contains("s.pbrt:1:39"), "{error}");
     }
     let text = b"Camera \"realistic\" \"string lensfile\" \"no.dat\" WorldBegin WorldEnd";
-    let error = load_files(&[("s.pbrt", text)]).1.err().expect("a mistake");
+    let error = load_files(&[("s.pbrt", text)]).1.expect_err("a mistake");
     assert!(
         error.to_string().contains("cannot read lens \"no.dat\""),
         "{error}"

@@ -396,6 +396,6 @@ fn disney_says_what_it_leaves_out() {
         assert!(said.contains(expected), "{parameters}: {said}");
     }
     let broken = load_text(r#"WorldBegin Material "disney" "float eta" 0 WorldEnd"#);
-    let error = broken.err().expect("an index of 0").to_string();
+    let error = broken.expect_err("an index of 0").to_string();
     assert!(error.contains("must be positive, found 0"), "{error}");
 }
