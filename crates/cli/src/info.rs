@@ -24,10 +24,11 @@ struct Document {
     #[serde(flatten)]
     machine: Machine,
     scene: String,
-    /// Shapes, triangles and spheres in the world. An object counts once for every instance.
+    /// Shapes, triangles, spheres and curves in the world. An object counts once for every instance.
     shapes: usize,
     triangles: usize,
     spheres: usize,
+    curves: usize,
     objects: usize,
     instances: usize,
     /// Every object counted once.
@@ -181,6 +182,7 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
             .standing_shapes()
             .filter(|shape| matches!(shape.geometry, Geometry::Sphere(_)))
             .count(),
+        curves: scene.curve_count(),
         objects: scene.objects.len(),
         instances: scene.instances.len(),
         stored_triangles: scene.stored_triangle_count(),
@@ -279,6 +281,7 @@ fn lights(scene: &Scene) -> Lights {
         counts.area_primitives += match &shape.geometry {
             Geometry::Mesh(mesh) => mesh.indices.len(),
             Geometry::Sphere(_) => 1,
+            Geometry::Curves(curves) => curves.first.len(),
         };
     }
     counts
@@ -387,7 +390,7 @@ fn text(document: &Document) -> String {
     let trees = draw(&header, &rows);
     format!(
         "{}\n\
-         shapes       {} with {} triangles and {} spheres; {} degenerate primitives left out\n\
+         shapes       {} with {} triangles, {} spheres and {} curves; {} degenerate primitives left out\n\
          objects      {} with {} instances; {} triangles are stored\n\
          bounds       {bounds}\n\
          materials    {}\n\
@@ -401,6 +404,7 @@ fn text(document: &Document) -> String {
         count(document.shapes as u64),
         count(document.triangles as u64),
         count(document.spheres as u64),
+        count(document.curves as u64),
         count(document.dropped_primitives as u64),
         count(document.objects as u64),
         count(document.instances as u64),

@@ -10,6 +10,8 @@ use crate::{Error, MemorySize};
 /// Bytes per stored triangle: its mesh, the kernel's geometry, the binary and the wide tree. Measured as the peak of
 /// the whole program on the built-in city of 1 and 3 million triangles (245 to 256).
 const PER_TRIANGLE: u64 = 256;
+/// Bytes per curve of TODO segments.
+const PER_CURVE: u64 = 2048;
 /// Bytes per instance in the scene, in the kernel and in the tree. Measured as the peak of the whole program on 400,000
 /// instances of two triangles, spread out (1500), and on a million in one place (1250).
 const PER_INSTANCE: u64 = 1440;
@@ -77,6 +79,7 @@ fn geometry(scene: &Scene) -> u64 {
     let meshes = scene.stored_shapes().map(|shape| match &shape.geometry {
         Geometry::Mesh(mesh) => mesh.indices.len() as u64 * PER_TRIANGLE,
         Geometry::Sphere(_) => PER_TRIANGLE,
+        Geometry::Curves(curves) => curves.first.len() as u64 * PER_CURVE,
     });
     let instances = scene.instances.len() as u64 * (PER_INSTANCE + size_of::<Instance>() as u64);
     meshes.fold(instances, u64::saturating_add)

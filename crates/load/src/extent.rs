@@ -112,6 +112,13 @@ fn points_of(shape: &Shape, add: &mut impl FnMut(Vec3)) {
             add(sphere.center - radius);
             add(sphere.center + radius);
         }
+        Geometry::Curves(curves) => {
+            for &[x, y, z, radius] in &curves.points {
+                let (point, radius) = (Vec3::new(x, y, z), Vec3::splat(radius));
+                add(point - radius);
+                add(point + radius);
+            }
+        }
     }
 }
 

@@ -225,6 +225,7 @@ fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> 
         .all(|shape| match &shape.geometry {
             Geometry::Mesh(mesh) => mesh.indices.is_empty(),
             Geometry::Sphere(_) => false,
+            Geometry::Curves(curves) => curves.first.is_empty(),
         });
     if is_empty {
         return Err(Error::EmptyMesh {

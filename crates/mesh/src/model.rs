@@ -38,7 +38,7 @@ impl Model {
         let count = |shapes: &[Shape]| -> usize {
             let meshes = shapes.iter().map(|shape| match &shape.geometry {
                 antumbra_scene::Geometry::Mesh(mesh) => mesh.indices.len(),
-                antumbra_scene::Geometry::Sphere(_) => 0,
+                antumbra_scene::Geometry::Sphere(_) | antumbra_scene::Geometry::Curves(_) => 0,
             });
             meshes.sum()
         };

@@ -6,7 +6,7 @@
 //! - `version4`: materials of pbrt-v4
 
 mod disney;
-pub(crate) mod hair;
+mod hair;
 mod subsurface;
 pub(crate) mod version4;
 

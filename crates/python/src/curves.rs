@@ -43,6 +43,34 @@ impl Segments {
     }
 }
 
+impl From<&Curves<'_>> for Segments {
+    /// A copy. Each chain of segments is a curve, and each segment a piece of it.
+    fn from(curves: &Curves<'_>) -> Self {
+        let firsts = curves.segments.to_vec();
+        let mut places: Vec<Place> = Vec::with_capacity(firsts.len());
+        for (index, &first) in firsts.iter().enumerate() {
+            let before = index
+                .checked_sub(1)
+                .map(|before| (firsts[before], places[before]));
+            places.push(match before {
+                Some((point, Place { curve, along })) if point.checked_add(1) == Some(first) => {
+                    let along = along.map(|end| end + 1.0);
+                    Place { curve, along }
+                }
+                before => Place {
+                    curve: before.map_or(0, |(_, place)| place.curve + 1),
+                    along: [0.0, 1.0],
+                },
+            });
+        }
+        Self {
+            points: curves.points.to_vec(),
+            firsts,
+            places,
+        }
+    }
+}
+
 /// How control points make a curve.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {

@@ -82,6 +82,7 @@ impl From<&Geometry<'_>> for Part {
                 opacity: mesh.opacity.clone(),
             },
             Geometry::Spheres(spheres) => Self::Spheres(spheres.to_vec()),
+            Geometry::Curves(curves) => Self::Curves(Segments::from(curves)),
             _ => Self::Spheres(Vec::new()),
         }
     }

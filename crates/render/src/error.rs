@@ -30,6 +30,12 @@ pub enum Error {
         /// Number of positions.
         positions: usize,
     },
+    /// A curve emits light.
+    #[error("shape {shape} is a curve that emits light; meshes and spheres may")]
+    CurveLight {
+        /// Position of the shape among the stored shapes: first of the world, then of the objects.
+        shape: usize,
+    },
     /// The scene moves, but its queries are answered without times: by an observer, or in an experiment.
     #[error(
         "the scene moves while the shutter is open, which this command does not support; `render` does"
@@ -59,8 +65,8 @@ pub enum Error {
         /// Largest number of parts.
         limit: usize,
     },
-    /// A material with light inside, subsurface scattering or hair, cannot be rendered.
-    #[error("material {index}, subsurface scattering or hair, cannot be rendered: {reason}")]
+    /// A material with subsurface scattering cannot be rendered.
+    #[error("material {index}, with subsurface scattering, cannot be rendered: {reason}")]
     Interior {
         /// Index of the material.
         index: usize,

@@ -7,9 +7,12 @@ use crate::{Geometry, Scene, Shape};
 
 /// Largest number of triangles of a flattened scene.
 ///
-/// A shape counts as its triangles, as a third of its vertices, or as one, whichever is most. Lowering and building
+/// A shape counts as its triangles, as a third of its vertices, as twice the control points of its curves, or as one, whichever is most. Lowering and building
 /// take about 140 bytes per triangle, so the limit corresponds to about 19 GB.
 pub const MAX_FLAT_TRIANGLES: u64 = 1 << 27;
+
+/// Segments that stand for a control point of a curve.
+const SEGMENTS: u64 = 2;
 
 /// Reason why a scene cannot be flattened.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -162,6 +165,7 @@ fn size(shapes: &[Shape]) -> u64 {
                 mesh.indices.len().max(vertices / 3).max(1) as u64
             }
             Geometry::Sphere(_) => 1,
+            Geometry::Curves(curves) => (curves.points.len() as u64 * SEGMENTS).max(1),
         })
         .sum()
 }

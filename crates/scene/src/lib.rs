@@ -9,7 +9,8 @@
 //! The parts of a scene serialize with `serde`, for fingerprints only. Long lists become their bytes in memory,
 //! which depend on the machine and cannot be read back.
 //!
-//! - [`shape`]: triangle meshes and spheres, each with its material and, perhaps, its emission
+//! - [`shape`]: triangle meshes, spheres and curves, each with its material and, perhaps, its emission
+//! - [`curve`]: hairs, fur and grass
 //! - [`instance`]: objects and their instances
 //! - [`flatten`]: scenes without instances, for users who trace none
 //! - [`transform`]: transformations of points and normals
@@ -36,6 +37,7 @@
 
 pub mod builtin;
 pub mod camera;
+pub mod curve;
 pub mod disney;
 pub mod film;
 pub mod flatten;
@@ -50,6 +52,7 @@ pub mod texture;
 pub mod transform;
 
 pub use camera::{Camera, LensElement, LensSystem, Projection};
+pub use curve::{CurveProfile, Curves};
 pub use disney::{Disney, DisneyBody};
 pub use film::{Film, Filter};
 pub use flatten::{Error, MAX_FLAT_TRIANGLES};
@@ -137,6 +140,15 @@ impl Scene {
         triangles(self.stored_shapes())
     }
 
+    /// Number of curves in the world; curves of an object count once per instance.
+    pub fn curve_count(&self) -> usize {
+        let curves = self.standing_shapes().map(|shape| match &shape.geometry {
+            Geometry::Curves(curves) => curves.first.len(),
+            Geometry::Mesh(_) | Geometry::Sphere(_) => 0,
+        });
+        curves.sum()
+    }
+
     /// Shapes of the world, then the shapes of every object, each once.
     pub fn stored_shapes(&self) -> impl Iterator<Item = &Shape> {
         let of_objects = self.objects.iter().flat_map(|object| &object.shapes);
@@ -148,7 +160,7 @@ fn triangles<'a>(shapes: impl Iterator<Item = &'a Shape>) -> usize {
     shapes
         .map(|shape| match &shape.geometry {
             Geometry::Mesh(mesh) => mesh.indices.len(),
-            Geometry::Sphere(_) => 0,
+            Geometry::Sphere(_) | Geometry::Curves(_) => 0,
         })
         .sum()
 }

@@ -171,7 +171,7 @@ pub enum Material {
         /// Mean cosine of the scattering angle, in (-1, 1).
         asymmetry: f32,
     },
-    /// Hair (Chiang, Bitterli, Tappan and Burley 2016). The shape must be a closed tube with texture coordinates along it.
+    /// Hair (Chiang, Bitterli, Tappan and Burley 2016), for curves: the texture coordinate v goes from 0 to 1 across it.
     Hair {
         /// Absorption inside.
         pigment: Pigment,

@@ -1,8 +1,8 @@
-//! Shapes: meshes and spheres with their attributes, and how transformations move them.
+//! Shapes: meshes, spheres and curves with their attributes, and how transformations move them.
 
 use std::sync::Arc;
 
-use crate::{MediumInterface, Param, Rgb, transform};
+use crate::{Curves, MediumInterface, Param, Rgb, transform};
 use glam::{DMat3, DMat4, DVec3, Mat3, Vec2, Vec3};
 use serde::Serialize;
 
@@ -27,7 +27,7 @@ pub struct Shape {
     ///
     /// As in pbrt-v3, geometric normals are flipped when exactly one of `reverse_orientation` and
     /// `transform_swaps_handedness` is true. For spheres, and for meshes with normals of their own,
-    /// only `reverse_orientation` decides.
+    /// only `reverse_orientation` decides. Curves also count `v` from the other side.
     pub transform_swaps_handedness: bool,
 }
 
@@ -45,10 +45,18 @@ impl Shape {
                 Geometry::Mesh(Arc::new(mesh))
             }
             Geometry::Sphere(sphere) => Geometry::Sphere(sphere.transformed(matrix)?),
+            Geometry::Curves(curves) => {
+                let mut curves = Curves::clone(curves);
+                curves.transform(matrix);
+                Geometry::Curves(Arc::new(curves))
+            }
         };
         let is_mirrored = transform::swaps_handedness(matrix);
+        // Normals of curves are on a side of the ray, in a mirror as well.
+        let turns_back = is_mirrored && matches!(geometry, Geometry::Curves(_));
         Some(Self {
             geometry,
+            reverse_orientation: self.reverse_orientation != turns_back,
             transform_swaps_handedness: self.transform_swaps_handedness != is_mirrored,
             ..self.clone()
         })
@@ -62,6 +70,8 @@ pub enum Geometry {
     Mesh(Arc<TriangleMesh>),
     /// Full sphere.
     Sphere(Sphere),
+    /// Thin curves.
+    Curves(Arc<Curves>),
 }
 
 /// Indexed triangle mesh.

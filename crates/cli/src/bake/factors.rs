@@ -68,8 +68,8 @@ pub fn run(
     let ground = bake.ground(isa, memory, &mut files)?;
     let scene = &ground.loaded.scene;
     let mut shapes = scene.shapes.iter();
-    if shapes.any(|shape| matches!(shape.geometry, Geometry::Sphere(_))) {
-        let reason = "it has spheres, which have no view factors";
+    if shapes.any(|shape| !matches!(shape.geometry, Geometry::Mesh(_))) {
+        let reason = "it has spheres or curves, which have no view factors";
         return Err(Failure::scene(&scene.name, reason));
     }
     let up = ground.up(args.up)?;

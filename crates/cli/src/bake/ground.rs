@@ -96,6 +96,12 @@ impl Ground {
             match &shape.geometry {
                 Geometry::Mesh(mesh) => key.mesh(&mesh.positions, &mesh.indices),
                 Geometry::Sphere(sphere) => key.text(&format!("{sphere:?}")),
+                Geometry::Curves(curves) => {
+                    let points = curves.points.as_flattened().iter();
+                    key.numbers(&points.map(|&x| x.into()).collect::<Vec<_>>());
+                    let first = curves.first.iter();
+                    key.numbers(&first.map(|&i| i.into()).collect::<Vec<_>>());
+                }
             }
         }
     }
@@ -184,7 +190,7 @@ impl Earth {
         let curvature = curvature.map_err(Failure::usage)?;
         for shape in &mut scene.shapes {
             let Geometry::Mesh(mesh) = &mut shape.geometry else {
-                let reason = "--curvature: it has spheres, which cannot be bent";
+                let reason = "--curvature: it has spheres or curves, which cannot be bent";
                 return Err(Failure::scene(&scene.name, reason));
             };
             let mesh = Arc::make_mut(mesh);
@@ -205,11 +211,12 @@ impl Earth {
 /// The scene has no mesh, or more vertices than a PLY file can hold.
 fn mesh(scene: &Scene, creases: bool) -> Result<(Mesh, usize), Failure> {
     let mut all = Mesh::default();
-    let (mut spheres, mut copies) = (0, 0);
+    let (mut spheres, mut curves, mut copies) = (0, 0, 0);
     for shape in &scene.shapes {
         match &shape.geometry {
             Geometry::Mesh(mesh) => copies += push(&mut all, shape, mesh, creases),
             Geometry::Sphere(_) => spheres += 1,
+            Geometry::Curves(found) => curves += found.first.len(),
         }
     }
     // Indices of PLY files are signed.
@@ -225,6 +232,11 @@ fn mesh(scene: &Scene, creases: bool) -> Result<(Mesh, usize), Failure> {
     if spheres > 0 && !creases {
         tell(format_args!(
             "note: {spheres} spheres occlude, but have no vertices to write"
+        ));
+    }
+    if curves > 0 && !creases {
+        tell(format_args!(
+            "note: {curves} curves occlude, but have no vertices to write"
         ));
     }
     Ok((all, copies))

@@ -23,7 +23,7 @@ impl Parts {
         for (index, shape) in scene.shapes.iter().enumerate() {
             let count = match &shape.geometry {
                 Geometry::Mesh(mesh) => mesh.indices.len(),
-                Geometry::Sphere(_) => 0,
+                Geometry::Sphere(_) | Geometry::Curves(_) => 0,
             };
             shapes.push([end as u32, count as u32]);
             let of_shape = named.get(index).filter(|_| has_names).into_iter().flatten();

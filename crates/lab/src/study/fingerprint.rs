@@ -13,6 +13,11 @@ pub fn of_scene(scene: &Scene) -> String {
         hasher.say(&(shape.material, &shape.area_light));
         match &shape.geometry {
             Geometry::Sphere(sphere) => hasher.say(sphere),
+            Geometry::Curves(curves) => {
+                hasher.say(&(curves.points.len(), curves.profile));
+                hasher.numbers(curves.points.iter().flatten().map(|x| x.to_bits()));
+                hasher.numbers(curves.first.iter().copied());
+            }
             Geometry::Mesh(mesh) => {
                 hasher.say(&[mesh.positions.len(), mesh.indices.len(), mesh.normals.len()]);
                 hasher.numbers(mesh.positions.iter().flatten().map(|x| x.to_bits()));

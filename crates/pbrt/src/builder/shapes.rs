@@ -1,4 +1,6 @@
 //! Shapes with their materials.
+//!
+//! Hairs come one by one. Those that differ in nothing but their points are one shape.
 
 use std::sync::Arc;
 
@@ -51,15 +53,6 @@ impl Builder<'_> {
         };
         let read = shape::read(kind, &mut values, &to_world, middle);
         let material = material::of_shape(current.as_deref(), &mut lookup, &self.state, report);
-        if material::hair::is_hair(&material) {
-            let curve_type = lookup.string("type", report).map(|(name, _)| name);
-            if kind.text != "curve" || curve_type == Some("ribbon") {
-                report.unsupported(
-                    at,
-                    "hair on other shapes than flat and cylindrical curves is",
-                );
-            }
-        }
         lookup.finish(report);
         let Some((source, cutouts)) = read else {
             return;
@@ -82,16 +75,17 @@ impl Builder<'_> {
             // The mesh of the file replaces the empty one later.
             Source::File(file) => (Geometry::Mesh(Arc::default()), Some(file)),
         };
-        let of_mesh = match &geometry {
+        let of_geometry = match &geometry {
             Geometry::Mesh(mesh) => mesh.bytes(),
             Geometry::Sphere(_) => 0,
+            Geometry::Curves(curves) => curves.bytes(),
         };
         let media = self.media(report);
         let of_motion = match moves {
             true => size_of::<Object>() + size_of::<Instance>(),
             false => 0,
         };
-        let bytes = (size_of::<Shape>() + of_motion) as u64 + of_mesh;
+        let bytes = (size_of::<Shape>() + of_motion) as u64 + of_geometry;
         if !self.budget.take(bytes, at, report) {
             return;
         }
@@ -102,7 +96,7 @@ impl Builder<'_> {
         let shape = Shape {
             geometry,
             material,
-            area_light: area_light.filter(|_| !is_of_object && !moves),
+            area_light: area_light.filter(|_| !is_of_object && !moves && kind.text != "curve"),
             media,
             alpha: cutouts.alpha,
             shadow_alpha: cutouts.shadow_alpha,
@@ -126,6 +120,9 @@ impl Builder<'_> {
             Some(object) => &mut self.objects[object].shapes,
             None => &mut self.shapes,
         };
+        if shapes.last_mut().is_some_and(|last| joins(last, &shape)) {
+            return;
+        }
         if let Some(file) = mesh_file {
             self.pending_meshes.push(object, shapes.len(), file);
         }
@@ -159,4 +156,28 @@ impl Builder<'_> {
                 self.materials.len() - 1
             })
     }
+}
+
+/// Control points of one shape at most. A curve of few points may need many segments.
+const MOST_POINTS: usize = 1 << 20;
+
+/// Adds curves to the curves of the last shape, if both have the same attributes. Returns whether that was done.
+fn joins(last: &mut Shape, shape: &Shape) -> bool {
+    let Geometry::Curves(more) = &shape.geometry else {
+        return false;
+    };
+    let is_alike = last.material == shape.material
+        && last.area_light == shape.area_light
+        && last.media == shape.media
+        && last.reverse_orientation == shape.reverse_orientation
+        && last.transform_swaps_handedness == shape.transform_swaps_handedness;
+    let Geometry::Curves(curves) = &mut last.geometry else {
+        return false;
+    };
+    let fits = curves.points.len() + more.points.len() <= MOST_POINTS;
+    if !(is_alike && curves.profile == more.profile && fits) {
+        return false;
+    }
+    Arc::make_mut(curves).append(more);
+    true
 }

@@ -39,13 +39,3 @@ pub(super) fn hair(values: &mut Textured) -> Material {
         tilt: values.param("alpha", 2.0),
     }
 }
-
-/// Whether a part of a material is hair.
-pub(crate) fn is_hair(material: &Material) -> bool {
-    match material {
-        Material::Hair { .. } => true,
-        Material::Bumped { material, .. } => is_hair(material),
-        Material::Mix { materials, .. } => materials.iter().any(|part| is_hair(part)),
-        _ => false,
-    }
-}

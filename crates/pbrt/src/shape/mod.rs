@@ -2,7 +2,8 @@
 //!
 //! - `mesh`: triangle meshes and their alpha masks;  `subdivision`: meshes that are made smooth
 //! - `bilinear`: patches of pbrt-v4;  `sphere`: spheres
-//! - `quadric`, `revolved`, `nurbs`, `curve`: smooth surfaces, tessellated to meshes by `grid`;  `heightfield`: heights
+//! - `curve`: curves;  `ribbon`: curves that become meshes
+//! - `quadric`, `revolved`, `nurbs`: smooth surfaces, tessellated to meshes by `grid`;  `heightfield`: heights
 
 mod bilinear;
 mod curve;
@@ -12,6 +13,7 @@ mod mesh;
 mod nurbs;
 mod quadric;
 mod revolved;
+mod ribbon;
 mod sphere;
 mod subdivision;
 
@@ -89,12 +91,23 @@ pub(crate) fn read(
             Some((moved(mesh, &to_world), cutouts))
         }
         "curve" => {
-            let mesh = curve::curve(values.lookup, values.report)?;
+            let geometry = curve::curve(values.lookup, middle, values.report)?;
             if is_emitter {
                 let at = values.lookup.at;
                 values.report.unsupported(at, "an area light on a curve is");
             }
-            without_cutouts(moved(mesh, to_world))
+            let to_world = to_world * DMat4::from_translation(middle);
+            without_cutouts(Source::Here(match geometry {
+                Geometry::Curves(mut curves) => {
+                    Arc::make_mut(&mut curves).transform(&to_world);
+                    Geometry::Curves(curves)
+                }
+                Geometry::Mesh(mut mesh) => {
+                    Arc::make_mut(&mut mesh).transform(&to_world);
+                    Geometry::Mesh(mesh)
+                }
+                Geometry::Sphere(sphere) => Geometry::Sphere(sphere),
+            }))
         }
         "cylinder" => {
             let mesh = quadric::cylinder(values.lookup, tessellation, values.report)?;

@@ -1,9 +1,9 @@
-//! Smooth shapes and their meshes.
+//! Smooth shapes, their meshes, and curves.
 
 use std::f64::consts::PI;
 
-use antumbra_scene::{Geometry, Shape, TriangleMesh};
-use glam::{DVec3, Vec3};
+use antumbra_scene::{CurveProfile, Curves, Geometry, Shape, TriangleMesh};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::{load_text, world};
 
@@ -186,21 +186,31 @@ fn emitters_are_divided_more_coarsely_and_emit_as_much() {
     assert_eq!(mesh_of(&scene.shapes[0]).indices.len(), 16);
 }
 
-#[test]
-fn tubes_have_the_width_of_their_curve() {
-    // A straight line of changing width: a frustum of eight sides.
-    let tube = mesh(
-        r#"Shape "curve" "string type" "cylinder" "point P" [0 0 0 0 0 1 0 0 2 0 0 3]
-        "float width0" 2 "float width1" 4"#,
-    );
-    assert_eq!(tube.indices.len(), 16);
-    let scale = (PI / 8.0) / (PI / 8.0).sin();
-    for i in 0..tube.positions.len() {
-        let p = point(&tube, i as u32);
-        let radius = scale * (1.0 + p.z / 3.0);
-        assert!((p.truncate().length() - radius).abs() < 1e-6, "{p}");
+/// Curves of the first shape of a world.
+fn curves(text: &str) -> Curves {
+    let scene = load_text(&format!("WorldBegin {text} WorldEnd"))
+        .unwrap()
+        .scene;
+    match &scene.shapes[0].geometry {
+        Geometry::Curves(curves) => Curves::clone(curves),
+        geometry => panic!("no curves: {geometry:?}"),
     }
-    area(&tube);
+}
+
+#[test]
+fn radii_of_curves_are_half_their_widths() {
+    let text = r#"Shape "curve" "string type" "cylinder" "point P" [0 0 0 0 0 1 0 0 2 0 0 3 0 0 4 0 0 5 0 0 6]
+        "float width0" 2 "float width1" 8"#;
+    let found = curves(text);
+    assert_eq!(found.profile, CurveProfile::Round);
+    assert_eq!(found.first, [0, 3]);
+    let expected: Vec<_> = (0..7)
+        .map(|i| [0.0, 0.0, i as f32, 1.0 + 0.5 * i as f32])
+        .collect();
+    assert_eq!(found.points, expected);
+    let scaled = curves(&format!("Translate 1 0 0 Scale -3 3 3 {text}"));
+    let last = scaled.points[6];
+    assert_eq!(last, [1.0, 0.0, 18.0, 12.0]);
 }
 
 #[test]
@@ -215,23 +225,59 @@ fn curves_of_every_kind_lie_on_their_line() {
         r#""string basis" "bspline" "point P" [-1 .66666667 0 0 -.33333333 0 1 .66666667 0 2 3.6666667 0]"#,
     ];
     for text in parabola {
-        let width = 0.01;
-        let text =
-            format!(r#"Shape "curve" "string type" "cylinder" "float width" {width} {text}"#);
-        let tube = mesh(&text);
-        area(&tube);
-        assert!(tube.positions.len() > 9 * 4, "{text}");
-        let ends = [f64::INFINITY, f64::NEG_INFINITY];
-        let [low, high] = (0..tube.positions.len() as u32).fold(ends, |[low, high], i| {
-            let p = point(&tube, i);
-            // The distance to the parabola, by its slope.
-            let across = (p.y - p.x * p.x) / (1.0 + 4.0 * p.x * p.x).sqrt();
-            let distance = across.hypot(p.z);
-            assert!(distance < 0.56 * width, "{text}: {p} is {distance} away");
-            [low.min(p.x), high.max(p.x)]
-        });
-        assert!(low.abs() < width && (high - 1.0).abs() < width, "{text}");
+        let found = curves(&format!(r#"Shape "curve" {text}"#));
+        assert_eq!(found.profile, CurveProfile::Flat);
+        let mut ends = Vec::new();
+        for curve in 0..found.first.len() as u32 {
+            let [a, b, c, d] = found.control(curve).map(|[x, y, ..]| Vec2::new(x, y));
+            for i in 0..=10 {
+                let t = i as f32 / 10.0;
+                let [ab, bc, cd] = [a.lerp(b, t), b.lerp(c, t), c.lerp(d, t)];
+                let p = ab.lerp(bc, t).lerp(bc.lerp(cd, t), t);
+                assert!((p.y - p.x * p.x).abs() < 1e-6, "{text}: {p}");
+            }
+            ends.extend([a.x, d.x]);
+        }
+        assert!(ends[0].abs() < 1e-6, "{text}");
+        assert!((ends[ends.len() - 1] - 1.0).abs() < 1e-6, "{text}");
     }
+}
+
+/// Hairs of one kind are one shape, whatever their number.
+#[test]
+fn curves_that_are_alike_are_one_shape() {
+    let hair = |x: u32| format!("Shape \"curve\" \"point P\" [{x} 0 0 {x} 0 1 {x} 0 2 {x} 0 3] ");
+    let [a, b, c] = [0, 1, 2].map(hair);
+    let text = format!(
+        "WorldBegin {a}{b} Material \"mirror\" {c} ReverseOrientation {a}{b}{c} ObjectBegin \"o\" {a}{b} ObjectEnd {c} WorldEnd"
+    );
+    let scene = load_text(&text).unwrap().scene;
+    let counts: Vec<_> = scene
+        .shapes
+        .iter()
+        .map(|shape| match &shape.geometry {
+            Geometry::Curves(curves) => curves.first.len(),
+            _ => 0,
+        })
+        .collect();
+    assert_eq!(counts, [2, 1, 4]);
+    let Geometry::Curves(last) = &scene.shapes[2].geometry else {
+        panic!("curves")
+    };
+    let x: Vec<f32> = (0..4).map(|curve| last.control(curve)[0][0]).collect();
+    assert_eq!(x, [0.0, 1.0, 2.0, 2.0]);
+}
+
+#[test]
+fn moving_curves_are_objects_that_move() {
+    let text = r#"WorldBegin ActiveTransform EndTime Translate 1 0 0 ActiveTransform All
+        Shape "curve" "point P" [0 0 0 0 0 1 0 0 2 0 0 3] WorldEnd"#;
+    let scene = load_text(text).unwrap().scene;
+    assert!(scene.shapes.is_empty() && scene.moves());
+    assert!(matches!(
+        scene.objects[0].shapes[0].geometry,
+        Geometry::Curves(_)
+    ));
 }
 
 #[test]
@@ -259,15 +305,28 @@ fn ribbons_face_their_normals() {
     }
 }
 
+/// As in pbrt-v3, u goes from 0 to 1 on each segment.
+#[test]
+fn segments_of_ribbons_have_their_own_coordinates() {
+    let ribbon = mesh(
+        r#"Shape "curve" "string type" "ribbon" "integer degree" 2 "point P" [0 0 0 1 0 0 2 0 0 3 0 0 4 0 0]
+        "normal N" [0 0 1 0 0 1 0 0 1]"#,
+    );
+    for (position, uv) in ribbon.positions.iter().zip(&ribbon.uvs) {
+        let u = position[0] / 2.0;
+        assert!(uv.x == u || uv.x == u - 1.0, "{position:?} {uv}");
+    }
+    assert!(ribbon.uvs.iter().filter(|uv| uv.x == 1.0).count() >= 4);
+}
+
 #[test]
 fn what_curves_leave_out_is_noted() {
     let text = r#"WorldBegin Shape "curve" "point P" [0 0 0 1 0 0 2 0 0 3 0 0] "integer splitdepth" 3 WorldEnd"#;
     let loaded = load_text(text).unwrap();
     let notes: Vec<&str> = loaded.notes.iter().map(|n| n.message.as_str()).collect();
-    let [flat, split] = notes[..] else {
+    let [split] = notes[..] else {
         panic!("{notes:?}")
     };
-    assert!(flat.contains("flat curves are taken as cylinders"));
     assert!(split.contains("\"splitdepth\" of shape \"curve\" is left out"));
 }
 

@@ -122,6 +122,8 @@ impl Emitter {
                 let area = 4.0 * PI * sphere.radius * sphere.radius;
                 (EmitterSurface::Sphere(*sphere), area)
             }
+            // Refused before.
+            Geometry::Curves(_) => return None,
         };
         (area > 0.0 && area.is_finite()).then(|| Self {
             shape: shape.clone(),

@@ -76,17 +76,6 @@ impl Material {
     }
 }
 
-impl Material {
-    /// Whether this is a fibre: a closed tube of which only the outside scatters, for the light inside as well.
-    pub fn is_fiber(&self) -> bool {
-        match self {
-            Self::None => false,
-            Self::Constant(bsdf) => bsdf.is_fiber(),
-            Self::Varying(varying) => varying.parameters.is_fiber(),
-        }
-    }
-}
-
 /// Height of the bumps of a material. A mix has the bumps of its first material, as in pbrt-v3.
 fn bumps(material: &antumbra_scene::Material) -> Option<&Param<f32>> {
     match material {

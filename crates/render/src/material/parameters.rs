@@ -331,20 +331,24 @@ impl Lowering<'_> {
                 eta,
                 roughness,
                 tilt,
-            } => Parameters::Hair {
-                pigment: match pigment {
-                    antumbra_scene::Pigment::Absorption(color) => {
-                        Pigment::Absorption(self.input(color))
-                    }
-                    antumbra_scene::Pigment::Color(color) => Pigment::Color(self.input(color)),
-                    antumbra_scene::Pigment::Melanin(melanin) => {
-                        Pigment::Melanin(melanin.each_ref().map(|value| self.input(value)))
-                    }
-                },
-                eta: self.input(eta),
-                roughness: roughness.each_ref().map(|value| self.input(value)),
-                tilt: self.input(tilt),
-            },
+            } => {
+                // By the texture coordinate across the hair.
+                self.varies = true;
+                Parameters::Hair {
+                    pigment: match pigment {
+                        antumbra_scene::Pigment::Absorption(color) => {
+                            Pigment::Absorption(self.input(color))
+                        }
+                        antumbra_scene::Pigment::Color(color) => Pigment::Color(self.input(color)),
+                        antumbra_scene::Pigment::Melanin(melanin) => {
+                            Pigment::Melanin(melanin.each_ref().map(|value| self.input(value)))
+                        }
+                    },
+                    eta: self.input(eta),
+                    roughness: roughness.each_ref().map(|value| self.input(value)),
+                    tilt: self.input(tilt),
+                }
+            }
             Scene::Fourier(table) => Parameters::Fourier(Arc::clone(table)),
             Scene::Mix { materials, amount } => Parameters::Mix {
                 parameterss: Box::new([
@@ -374,15 +378,6 @@ impl Lowering<'_> {
 }
 
 impl Parameters {
-    /// Whether a part is hair.
-    pub fn is_fiber(&self) -> bool {
-        match self {
-            Self::Hair { .. } => true,
-            Self::Mix { parameterss, .. } => parameterss.iter().any(Self::is_fiber),
-            _ => false,
-        }
-    }
-
     /// BSDF at a place. Negative colours count as 0, as in pbrt.
     pub fn bsdf(&self, place: &Place) -> Bsdf {
         let color = |input: &Input<Rgb>| input.at(place).max(Vec3::ZERO);
@@ -586,7 +581,9 @@ impl Parameters {
                         absorption_of_melanin(melanin.each_ref().map(|value| value.at(place)))
                     }
                 };
-                let hair = Hair::new(eta.at(place), absorption, roughness, tilt.at(place));
+                let (eta, tilt) = (eta.at(place), tilt.at(place));
+                let offset = 2.0 * place.uv.y - 1.0;
+                let hair = Hair::new(eta, absorption, roughness, tilt, offset);
                 Bsdf::lobes(vec![Lobe::Hair(hair)])
             }
             Self::Fourier(table) => {

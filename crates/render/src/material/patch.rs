@@ -4,7 +4,7 @@ use antumbra::{Hit, Ray};
 use antumbra_scene::{Geometry, Sphere, TriangleMesh};
 use glam::{Vec2, Vec3};
 
-use crate::surface::{DEFAULT_UV, Placement, Shapes, Surface, corners, vertex_color};
+use crate::surface::{CurvePoint, DEFAULT_UV, Placement, Shapes, Surface, corners, vertex_color};
 use crate::texture::Place;
 
 /// Change of position and normal with the surface's own coordinates u and v.
@@ -44,6 +44,10 @@ impl Patch {
         let mut patch = match &shapes[surface.shape].geometry {
             Geometry::Mesh(mesh) => Self::of_triangle(mesh, placement, surface, hit),
             Geometry::Sphere(sphere) => Self::of_sphere(sphere, placement, surface),
+            Geometry::Curves(curves) => {
+                let curves = (surface.shape, &**curves);
+                Self::of_curve(CurvePoint::new(shapes, curves, hit, surface.wo, placement))
+            }
         };
         if let Some(rays) = neighbours {
             let steps = rays.each_ref().map(|ray| step(surface, ray));
@@ -115,6 +119,19 @@ impl Patch {
             tangents,
             bump_tangents,
             normal_changes,
+        }
+    }
+
+    fn of_curve(found: CurvePoint) -> Self {
+        Self {
+            place: Place {
+                point: found.point,
+                uv: found.uv,
+                ..Place::default()
+            },
+            tangents: found.tangents,
+            bump_tangents: found.tangents,
+            normal_changes: [Vec3::ZERO; 2],
         }
     }
 

@@ -9,6 +9,7 @@ use antumbra_simd::{Dispatch, Simd, Width, WithSimd};
 use glam::Vec3;
 
 use super::Surface;
+use super::curve::CurvePoint;
 use super::origin_offset::{self, EDGE_ERRORS, Room, offset, offset_distance};
 use super::point::{on_sphere, start_inside};
 use super::shapes::Shapes;
@@ -31,7 +32,7 @@ pub struct ShapeHit {
     pub shape: u32,
     /// Instance that was hit, by the kernel's `inst_id`.
     pub inst_id: u32,
-    /// Triangle of the mesh. 0 on a sphere.
+    /// Triangle of the mesh, or segment of the curves. 0 on a sphere.
     pub primitive: u32,
 }
 
@@ -137,7 +138,7 @@ impl SurfaceBlock {
         places: &[u32],
     ) {
         let hit = |place: u32| hits[place as usize].as_ref().expect("a hit");
-        let mut special = false;
+        let (mut special, mut has_curves) = (false, false);
         let found = &mut self.found;
         let mut triangles = Triangles {
             mesh: [None; BLOCK],
@@ -157,6 +158,7 @@ impl SurfaceBlock {
             match &shape.geometry {
                 Geometry::Mesh(mesh) => triangles.mesh[lane] = Some(mesh),
                 Geometry::Sphere(_) => special = true,
+                Geometry::Curves(_) => has_curves = true,
             }
         }
         for (lane, &place) in places.iter().enumerate() {
@@ -180,6 +182,11 @@ impl SurfaceBlock {
         for (lane, &place) in places.iter().enumerate() {
             if self.surfaces.narrow[lane] != 0 {
                 self.move_inside(lane, shapes, hit(place));
+            }
+        }
+        if has_curves {
+            for (lane, &place) in places.iter().enumerate() {
+                self.put_on_curve(lane, shapes, hit(place));
             }
         }
     }
@@ -238,6 +245,24 @@ impl SurfaceBlock {
             }
             columns.scale[lane] = placement.least_scale;
         }
+    }
+
+    /// Puts a lane that hit a curve on the curve.
+    fn put_on_curve(&mut self, lane: usize, shapes: &Shapes, hit: &Hit) {
+        let index = self.hit[lane].shape as usize;
+        let Geometry::Curves(curves) = &shapes[index].geometry else {
+            return;
+        };
+        let columns = &mut self.surfaces;
+        let (wo, placement) = (columns.wo.get(lane), shapes.placement(hit));
+        let found = CurvePoint::new(shapes, (index, curves), hit, wo, placement.as_deref());
+        columns.point.set(lane, found.point);
+        columns.normal.set(lane, found.normal);
+        columns.shading_normal.set(lane, found.normal);
+        columns.start.set(lane, found.start);
+        columns.distance[lane] = found.distance;
+        let origin = offset(found.start, found.normal, found.distance, wo);
+        columns.origin.set(lane, origin);
     }
 
     /// Moves the beginning of rays from an edge.
@@ -312,10 +337,19 @@ impl WithSimd<16> for FetchIndices<'_> {
             let Some(hit) = &self.hits[place as usize] else {
                 continue;
             };
-            if let Geometry::Mesh(mesh) = &self.shapes[self.shapes.index_of(hit)].geometry
-                && let Some(indices) = mesh.indices.get(hit.prim_id as usize)
-            {
-                simd.prefetch(indices);
+            let index = self.shapes.index_of(hit);
+            match &self.shapes[index].geometry {
+                Geometry::Mesh(mesh) => {
+                    if let Some(indices) = mesh.indices.get(hit.prim_id as usize) {
+                        simd.prefetch(indices);
+                    }
+                }
+                Geometry::Sphere(_) => {}
+                Geometry::Curves(_) => {
+                    if let Some(part) = self.shapes.curve_parts(index).get(hit.prim_id as usize) {
+                        simd.prefetch(part);
+                    }
+                }
             }
             if let Some(placement) = self.shapes.stored_placement(hit) {
                 simd.prefetch(placement);

@@ -4,10 +4,12 @@
 //! - `block.rs`: points of many hits at once
 //! - `origin_offset.rs`: how far rays start from their surface
 //! - `triangle.rs`: points and normals of triangles, with error bounds
+//! - `curve.rs`: points of curves
 //! - `shapes.rs`: shapes and placements of the scene, found by a hit
 //! - `frame.rs`: orthonormal frames, reflection, refraction
 
 mod block;
+mod curve;
 mod frame;
 mod origin_offset;
 mod point;
@@ -15,6 +17,7 @@ mod shapes;
 mod triangle;
 
 pub use block::{SurfaceBlock, Surfaces};
+pub use curve::{CurvePart, CurvePoint, segments};
 pub use frame::{Frame, reflect, refract, same_hemisphere};
 pub use origin_offset::{Room, SEGMENT_SHARE, offset, offset_distance, segment};
 pub use point::Surface;

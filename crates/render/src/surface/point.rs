@@ -4,6 +4,7 @@ use antumbra::{Hit, Ray};
 use antumbra_scene::{Geometry, Shape, Sphere};
 use glam::Vec3;
 
+use super::curve::{CurvePoint, tangent_near};
 use super::origin_offset::{self, EDGE_ERRORS, Room, offset, offset_distance, segment};
 use super::shapes::{Placement, Shapes};
 use super::triangle::{
@@ -34,13 +35,13 @@ pub struct Surface {
     pub shape: usize,
     /// Instance of the kernel that was hit.
     pub inst_id: u32,
-    /// Triangle of the mesh. 0 on a sphere.
+    /// Triangle of the mesh, or segment of the curves. 0 on a sphere.
     pub primitive: u32,
 }
 
 impl Surface {
-    /// Surface at a hit that `ray` found among `shapes`. `vertices` of the triangle and its `plane` are ignored on a
-    /// sphere.
+    /// Surface at a hit that `ray` found among `shapes`. `vertices` of the triangle and its `plane` are ignored on
+    /// spheres and curves.
     #[inline]
     pub fn at(shapes: &Shapes, ray: &Ray, hit: &Hit, vertices: &Vertices, plane: &Plane) -> Self {
         let index = shapes.index_of(hit);
@@ -60,6 +61,23 @@ impl Surface {
             Geometry::Sphere(sphere) => {
                 let (point, error, normal) = on_sphere(shape, sphere, placement, ray, hit);
                 (point, error, normal, normal, f32::INFINITY)
+            }
+            Geometry::Curves(curves) => {
+                let wo = (-dir).normalize();
+                let found = CurvePoint::new(shapes, (index, curves), hit, wo, placement);
+                return Self {
+                    point: found.point,
+                    start: found.start,
+                    distance: found.distance,
+                    origin_offset: shapes.origin_offset,
+                    origin: offset(found.start, found.normal, found.distance, wo),
+                    normal: found.normal,
+                    shading_normal: found.normal,
+                    wo,
+                    shape: index,
+                    inst_id: hit.inst_id,
+                    primitive: hit.prim_id,
+                };
             }
         };
         let (point, error, normal, shading_normal, scale) = match placement {
@@ -102,7 +120,7 @@ impl Surface {
     pub fn found(shapes: &Shapes, ray: &Ray, hit: &Hit) -> Self {
         let vertices = match &shapes[shapes.index_of(hit)].geometry {
             Geometry::Mesh(mesh) => Vertices::new(mesh, mesh.indices[hit.prim_id as usize]),
-            Geometry::Sphere(_) => Vertices::default(),
+            Geometry::Sphere(_) | Geometry::Curves(_) => Vertices::default(),
         };
         let plane = Plane::new(vertices.corners);
         Self::at(shapes, ray, hit, &vertices, &plane)
@@ -194,6 +212,10 @@ impl Surface {
                     placement.object_normal(self.normal)
                 });
                 Vec3::new(-normal.y, normal.x, 0.0)
+            }
+            Geometry::Curves(curves) => {
+                let point = placement.map_or(self.point, |to| to.object_point(self.point));
+                tangent_near(shapes, (self.shape, curves), self.primitive, point)
             }
         };
         placement.map_or(tangent, |placement| placement.tangent(tangent))

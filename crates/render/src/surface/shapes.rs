@@ -7,6 +7,7 @@ use antumbra::{Aabb, Hit, INVALID_ID, MovingInstance};
 use antumbra_scene::{Scene, Shape};
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
+use super::curve::CurvePart;
 use super::triangle::gamma;
 use crate::world::moving_instance;
 
@@ -16,6 +17,8 @@ use crate::world::moving_instance;
 #[derive(Debug)]
 pub struct Shapes {
     shapes: Vec<Shape>,
+    /// Parts of curves by segment, for every shape.
+    curve_parts: Vec<Vec<CurvePart>>,
     /// Place of the first shape of the object of each instance. Apart from the placements, which miss the cache.
     first_of_instance: Vec<u32>,
     placements: Vec<Placement>,
@@ -25,8 +28,8 @@ pub struct Shapes {
 }
 
 impl Shapes {
-    /// Shapes of a scene inside `bounds`. Instances must be of objects that exist.
-    pub fn new(scene: &Scene, bounds: &Aabb) -> Self {
+    /// Shapes of a scene inside `bounds`, with the parts of their curves. Instances must be of objects that exist.
+    pub fn new(scene: &Scene, bounds: &Aabb, curve_parts: Vec<Vec<CurvePart>>) -> Self {
         let mut shapes = scene.shapes.clone();
         let mut first_of_object = Vec::with_capacity(scene.objects.len());
         for object in &scene.objects {
@@ -41,6 +44,7 @@ impl Shapes {
         let first_of_instance = objects.map(|object| first_of_object[object] as u32);
         Self {
             shapes,
+            curve_parts,
             first_of_instance: first_of_instance.collect(),
             placements: placements.collect(),
             motion: Motion::new(scene),
@@ -53,6 +57,7 @@ impl Shapes {
     pub fn of_world(shapes: &[Shape]) -> Self {
         Self {
             shapes: shapes.to_vec(),
+            curve_parts: vec![Vec::new(); shapes.len()],
             first_of_instance: Vec::new(),
             placements: Vec::new(),
             motion: None,
@@ -68,6 +73,12 @@ impl Shapes {
             instance => self.first_of_instance[self.instance(instance).0],
         };
         first as usize + hit.geom_id as usize
+    }
+
+    /// Parts of the curves of a shape, by segment.
+    #[inline]
+    pub fn curve_parts(&self, index: usize) -> &[CurvePart] {
+        &self.curve_parts[index]
     }
 
     /// Placement of the instance that was hit. `None` for a shape of the world.

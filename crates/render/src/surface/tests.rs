@@ -4,13 +4,17 @@
 use std::sync::Arc;
 
 use antumbra::{Aabb, Hit, INVALID_ID, Isa, Ray};
-use antumbra_scene::{Geometry, Instance, Object, Scene, Shape, Sphere, TriangleMesh};
+use antumbra_scene::{
+    CurveProfile, Curves, Geometry, Instance, Object, Scene, Shape, Sphere, TriangleMesh,
+};
 use glam::{Affine3, DVec3, Quat, Vec3};
 
 use super::{Frame, Shapes, Surface, SurfaceBlock};
 use crate::columns::BLOCK;
 use crate::sampler::warp::cosine_hemisphere;
 use crate::sampler::{Method, Sampler, Stream};
+use crate::texture::Textures;
+use crate::world::Lowered;
 
 /// A convex body around 0.
 struct Body {
@@ -203,7 +207,7 @@ fn rays_begin_inside_of_wedges() {
     }
 }
 
-/// Spheres and meshes, with and without normals, in the world and in stretched and mirrored instances.
+/// Spheres, curves and meshes, with and without normals, in the world and in stretched and mirrored instances.
 #[test]
 fn blocks_hold_the_surfaces_of_single_hits() {
     let sampler = Sampler::new(Method::Independent, 9);
@@ -243,8 +247,20 @@ fn blocks_hold_the_surfaces_of_single_hits() {
             shape(Geometry::Mesh(Arc::new(mesh)), i)
         });
         let ball = Sphere::new(vector(seed + 7), 1.5);
+        let curves = |profile: CurveProfile| {
+            let points = (0..16).map(|i| vector(seed + 500 + 3 * i).extend(0.1).to_array());
+            shape(
+                Geometry::Curves(Arc::new(Curves {
+                    points: points.collect(),
+                    first: vec![0, 3, 6, 9, 12],
+                    profile,
+                })),
+                seed & 3,
+            )
+        };
         meshes
             .chain([shape(Geometry::Sphere(ball), seed & 1)])
+            .chain([CurveProfile::Flat, CurveProfile::Round].map(curves))
             .collect()
     };
     let instance = |scale: Vec3, turn: f32| Instance {
@@ -281,7 +297,8 @@ fn blocks_hold_the_surfaces_of_single_hits() {
         min: [-10.0; 3],
         max: [10.0; 3],
     };
-    let shapes = Shapes::new(&scene, &bounds);
+    let parts = Lowered::with(&scene, &mut Textures::default()).1;
+    let shapes = Shapes::new(&scene, &bounds, parts);
     let (mut rays, mut hits) = (Vec::new(), Vec::new());
     for place in 0..1000 {
         let stream = sampler.stream(5, 6, place);
@@ -293,7 +310,7 @@ fn blocks_hold_the_surfaces_of_single_hits() {
             u: 1.0 - root,
             v: b * root,
             prim_id: at(3, 10.0),
-            geom_id: at(4, 5.0),
+            geom_id: at(4, 7.0),
             inst_id: [INVALID_ID, 0, 1][at(5, 3.0) as usize],
         }));
         rays.push(Ray {

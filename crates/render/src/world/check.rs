@@ -17,6 +17,9 @@ pub fn check(scene: &Scene) -> Result<(), Error> {
                 materials,
             });
         }
+        if matches!(shape.geometry, Geometry::Curves(_)) && shape.area_light.is_some() {
+            return Err(Error::CurveLight { shape: index });
+        }
         if let Geometry::Mesh(mesh) = &shape.geometry {
             let positions = mesh.positions.len();
             for (attribute, found) in [
@@ -55,7 +58,6 @@ pub fn check(scene: &Scene) -> Result<(), Error> {
 /// Whether light goes on inside of shapes of this material.
 pub fn is_body(material: &Material) -> bool {
     match material {
-        Material::Hair { .. } => true,
         Material::Subsurface { .. } => true,
         Material::Disney(disney) => disney.scatters_inside(),
         Material::Bumped { material, .. } | Material::NormalMapped { material, .. } => {
@@ -63,15 +65,6 @@ pub fn is_body(material: &Material) -> bool {
         }
         Material::Mix { materials, .. } => materials.iter().any(|part| is_body(part)),
         _ => false,
-    }
-}
-
-/// Whether a part of a material is a body with subsurface scattering.
-fn is_subsurface(material: &Material) -> bool {
-    match material {
-        Material::Mix { materials, .. } => materials.iter().any(|part| is_subsurface(part)),
-        Material::Disney(disney) => disney.scatters_inside(),
-        material => matches!(material, Material::Subsurface { .. }),
     }
 }
 
@@ -96,10 +89,7 @@ fn check_bodies(scene: &Scene) -> Result<(), Error> {
                 }
                 "the index of refraction or the mean cosine is out of range"
             }
-            (Material::Hair { .. }, _) | (Material::Disney(_), _) => continue,
-            (Material::Mix { materials, .. }, _) if !materials.iter().any(|m| is_subsurface(m)) => {
-                continue;
-            }
+            (Material::Disney(_), _) => continue,
             _ => "it is part of a mixture",
         };
         return Err(Error::Interior { index, reason });

@@ -7,6 +7,7 @@ use antumbra::{MovingGeometry, MovingInstance, MovingScene, Primitives, Sphere};
 use antumbra_scene::{Geometry, Instance, Scene, Shape};
 use glam::Affine3;
 
+use crate::surface::{CurvePart, segments};
 use crate::texture::Cutouts;
 use crate::texture::Textures;
 
@@ -24,18 +25,29 @@ pub struct Lowered<'s> {
 impl<'s> Lowered<'s> {
     /// Geometry of a scene that [`World::new`](crate::World::new) accepts, alpha masks included.
     pub fn new(scene: &'s Scene) -> Self {
-        Self::with(scene, &mut Textures::default())
+        Self::with(scene, &mut Textures::default()).0
     }
 
-    /// Geometry of a scene, with textures shared with `textures`.
-    pub(crate) fn with(scene: &'s Scene, textures: &mut Textures) -> Self {
-        let mut of_shapes = |shapes| of_shapes(shapes, textures);
+    /// Geometry of a scene, with textures shared with `textures`, and the parts of the curves of each stored shape.
+    pub(crate) fn with(scene: &'s Scene, textures: &mut Textures) -> (Self, Vec<Vec<CurvePart>>) {
+        let mut parts = Vec::new();
+        let mut of_shapes = |shapes: &'s [Shape]| -> Vec<_> {
+            let shapes = shapes.iter().map(|shape| {
+                let (geometry, of_shape) = of_shape(shape, textures);
+                parts.push(of_shape);
+                geometry
+            });
+            shapes.collect()
+        };
+        let world = of_shapes(&scene.shapes);
         let objects = scene.objects.iter();
-        Self {
-            world: of_shapes(&scene.shapes),
-            objects: objects.map(|object| of_shapes(&object.shapes)).collect(),
+        let objects = objects.map(|object| of_shapes(&object.shapes)).collect();
+        let lowered = Self {
+            world,
+            objects,
             instances: scene.instances.iter().map(of_instance).collect(),
-        }
+        };
+        (lowered, parts)
     }
 
     /// The geometry with the keys of `scene`, whose it is; `None` where no instance moves.
@@ -65,15 +77,11 @@ impl<'s> Lowered<'s> {
     }
 }
 
-fn of_shapes<'s>(shapes: &'s [Shape], textures: &mut Textures) -> Vec<antumbra::Geometry<'s>> {
-    shapes
-        .iter()
-        .map(|shape| of_shape(shape, textures))
-        .collect()
-}
-
-fn of_shape<'s>(shape: &'s Shape, textures: &mut Textures) -> antumbra::Geometry<'s> {
-    match &shape.geometry {
+fn of_shape<'s>(
+    shape: &'s Shape,
+    textures: &mut Textures,
+) -> (antumbra::Geometry<'s>, Vec<CurvePart>) {
+    let geometry = match &shape.geometry {
         Geometry::Mesh(mesh) => {
             let (positions, indices) = (&mesh.positions[..], &mesh.indices[..]);
             match Cutouts::new(shape, textures) {
@@ -85,7 +93,12 @@ fn of_shape<'s>(shape: &'s Shape, textures: &mut Textures) -> antumbra::Geometry
             center: sphere.center.to_array(),
             radius: sphere.radius,
         }])),
-    }
+        Geometry::Curves(curves) => {
+            let (curves, parts) = segments(curves);
+            return (antumbra::Geometry::curves(curves), parts);
+        }
+    };
+    (geometry, Vec::new())
 }
 
 /// An instance. The kernel refuses instances of missing objects.

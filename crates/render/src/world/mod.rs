@@ -101,7 +101,7 @@ impl World {
         let start = Instant::now();
         check(scene)?;
         let mut textures = Textures::default();
-        let lowered = Lowered::with(scene, &mut textures);
+        let (lowered, curve_parts) = Lowered::with(scene, &mut textures);
         let moving = lowered.moving(scene).map_err(Error::Geometry)?;
         let (primitives, bounds, motion) = match moving {
             None => {
@@ -127,17 +127,14 @@ impl World {
         let has_surface = |material: &antumbra_scene::Material| {
             !matches!(material, antumbra_scene::Material::None)
         };
-        let is_fiber = |material: &Material| material.is_fiber();
-        let has_fibers = materials.iter().any(is_fiber);
         let ends_by_occlusion = scene.materials.iter().all(has_surface)
-            && !has_fibers
             && scene
                 .stored_shapes()
                 .all(|shape| shape.shadow_alpha.is_none());
         let contents = Contents {
-            shapes: Shapes::new(scene, &bounds),
+            shapes: Shapes::new(scene, &bounds, curve_parts),
             materials,
-            has_bodies: has_fibers || scene.materials.iter().any(check::is_body),
+            has_bodies: scene.materials.iter().any(check::is_body),
             media: scene.media.iter().map(Medium::new).collect(),
             lights,
             emitters,
@@ -258,7 +255,7 @@ impl World {
         self.materials.iter().any(varies)
     }
 
-    /// Whether light goes on inside of bodies or hair.
+    /// Whether light goes on inside of bodies.
     pub(crate) fn has_bodies(&self) -> bool {
         self.has_bodies
     }

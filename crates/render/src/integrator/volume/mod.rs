@@ -9,8 +9,6 @@
 //!
 //! Light that enters a body with subsurface scattering walks until it leaves (`wander.rs`).
 //!
-//! Hair is a tube that scatters at its outside for the light inside as well. Rays pass its inside.
-//!
 //! pbrt-v3 does not find the emission of a surface without a material by sampling the BSDF, and yet weights light samples
 //! as if it did. Here both techniques find such light.
 
@@ -341,15 +339,9 @@ fn medium(world: &World, index: Option<u32>) -> Option<&Medium> {
     index.map(|index| &world.media[index as usize])
 }
 
-/// Whether rays and light go on straight through a surface: one without a material, or a fibre that is hit from inside.
+/// Whether rays and light go on straight through a surface, which has no material.
 fn lets_pass(world: &World, surface: &Surface) -> bool {
-    let material = world.material(surface.shape);
-    if let Material::None = material {
-        return true;
-    }
-    let is_inside = surface.wo.dot(surface.normal) < 0.0;
-    // Reversed normals point inward.
-    is_inside != world.shapes[surface.shape].reverse_orientation && material.is_fiber()
+    matches!(world.material(surface.shape), Material::None)
 }
 
 /// Medium of a ray along `dir` that leaves a surface, which it reached through the medium `here`.

@@ -1,9 +1,9 @@
 //! Scattering by hair: a rough dielectric cylinder with tilted scales that absorbs inside (Chiang, Bitterli, Tappan and
 //! Burley 2016, *A Practical and Controllable Hair and Fur Model for Production Path Tracing*, as in pbrt-v3).
 //!
-//! The x axis of the frame points along the hair, and z is the normal of the cylinder. Light is reflected (path 0),
-//! passes through (1), is reflected inside once (2), or more often (the last). The offset across the hair,
-//! which pbrt-v3 takes from the texture coordinate of a flat curve, follows from the angle between normal and viewer.
+//! The x axis of the frame points along the hair. Light is reflected (path 0), passes through (1), is reflected inside once
+//! (2), or more often (the last). The offset across the hair is the texture coordinate v, as in pbrt-v3. The normal matters
+//! not: angles around the hair are measured from the viewer.
 
 use std::f32::consts::{PI, TAU};
 
@@ -28,6 +28,8 @@ const PHEOMELANIN: Vec3 = Vec3::new(0.187, 0.4, 1.05);
 pub struct Hair {
     scale: Vec3,
     eta: f32,
+    /// Offset of the point from the axis as the viewer sees it, -1..=1 from side to side.
+    offset: f32,
     /// Absorption coefficient, per radius of the hair.
     absorption: Vec3,
     /// Variance along the hair of every path.
@@ -51,8 +53,14 @@ struct Viewed {
 
 impl Hair {
     /// Hair by its index of refraction, the absorption coefficient per radius, the roughness along and around, both
-    /// 0..=1, and the tilt of the scales in degrees.
-    pub fn new(eta: f32, absorption: Vec3, [along, around]: [f32; 2], tilt: f32) -> Self {
+    /// 0..=1, and the tilt of the scales in degrees; at an offset from the axis, -1..=1.
+    pub fn new(
+        eta: f32,
+        absorption: Vec3,
+        [along, around]: [f32; 2],
+        tilt: f32,
+        offset: f32,
+    ) -> Self {
         let [m, n] = [along, around].map(|beta| beta.clamp(SMOOTHEST, 1.0));
         let deviation = 0.726 * m + 0.812 * m * m + 3.7 * m.powi(20);
         let v = deviation * deviation;
@@ -64,6 +72,7 @@ impl Hair {
         Self {
             scale: Vec3::ONE,
             eta,
+            offset: offset.clamp(-1.0, 1.0),
             absorption: absorption.max(Vec3::ZERO),
             variances: [v, 0.25 * v, 4.0 * v, 4.0 * v],
             spread: (PI / 8.0).sqrt() * (0.265 * n + 1.194 * n * n + 5.372 * n.powi(22)),
@@ -87,8 +96,7 @@ impl Hair {
     fn viewed(&self, wo: Vec3) -> Viewed {
         let sin = wo.x.clamp(-1.0, 1.0);
         let cos = safe_root(1.0 - sin * sin).max(1e-6);
-        let across = wo.y.hypot(wo.z).max(f32::MIN_POSITIVE);
-        let h = (-wo.y / across).clamp(-1.0, 1.0);
+        let h = self.offset;
         let sin_inside = sin / self.eta;
         let cos_inside = safe_root(1.0 - sin_inside * sin_inside).max(1e-6);
         // Index of refraction across the hair (Marschner and others 2003).
@@ -262,12 +270,14 @@ mod tests {
     use crate::medium::Random;
     use crate::sampler::warp::uniform_sphere;
 
-    fn viewers() -> impl Iterator<Item = Vec3> {
+    /// Viewers of a cylinder whose normal is z, and the offset from the axis at which they see it.
+    fn viewers() -> impl Iterator<Item = (Vec3, f32)> {
         [(0.1, 0.2), (0.5, -0.7), (-0.8, 0.95), (0.0, -0.3)]
             .into_iter()
             .map(|(x, h): (f32, f32)| {
                 let across = (1.0 - x * x).sqrt();
-                Vec3::new(x, -h * across, (1.0 - h * h).sqrt() * across)
+                let wo = Vec3::new(x, -h * across, (1.0 - h * h).sqrt() * across);
+                (wo, h)
             })
     }
 
@@ -288,8 +298,8 @@ mod tests {
     #[test]
     fn white_hair_loses_nothing() {
         for roughness in ROUGHNESSES {
-            let hair = Hair::new(1.55, Vec3::ZERO, roughness, 0.0);
-            for wo in viewers() {
+            for (wo, h) in viewers() {
+                let hair = Hair::new(1.55, Vec3::ZERO, roughness, 0.0, h);
                 let mut sums = [0.0_f64; 2];
                 for wi in around() {
                     let found = hair.evaluate(wo, wi);
@@ -309,8 +319,9 @@ mod tests {
     fn directions_are_drawn_with_their_density() {
         let weigh = |wi: Vec3| 1.0 + 0.5 * wi.x + 0.3 * wi.y * wi.z - 0.4 * wi.z;
         for roughness in ROUGHNESSES {
-            let hair = Hair::new(1.55, Vec3::new(0.2, 0.6, 1.5), roughness, 2.0);
-            for wo in viewers() {
+            let absorption = Vec3::new(0.2, 0.6, 1.5);
+            for (wo, h) in viewers() {
+                let hair = Hair::new(1.55, absorption, roughness, 2.0, h);
                 let mut uniform = Vec3::ZERO;
                 for wi in around() {
                     uniform += hair.evaluate(wo, wi).value * (wi.z.abs() * weigh(wi));
@@ -338,8 +349,8 @@ mod tests {
     /// Smooth hair reflects as a mirror does: the peak is where light is reflected at the normal.
     #[test]
     fn reflection_is_about_the_normal() {
-        let hair = Hair::new(1.55, Vec3::splat(100.0), [0.1, 0.1], 0.0);
-        for wo in viewers().filter(|wo| wo.z > 0.4) {
+        for (wo, h) in viewers().filter(|(wo, _)| wo.z > 0.4) {
+            let hair = Hair::new(1.55, Vec3::splat(100.0), [0.1, 0.1], 0.0, h);
             let mirrored = Vec3::new(-wo.x, -wo.y, wo.z);
             let peak = hair.evaluate(wo, mirrored).value.x * mirrored.z;
             for turn in [Vec3::Y, -Vec3::Y, Vec3::X, -Vec3::X] {
@@ -348,6 +359,23 @@ mod tests {
                     hair.evaluate(wo, near).value.x * near.z < peak,
                     "{wo} {turn}"
                 );
+            }
+        }
+    }
+
+    /// A turn of the frame about the hair changes nothing: only the offset says where the hair is hit.
+    #[test]
+    fn normals_do_not_matter() {
+        let hair = Hair::new(1.55, Vec3::splat(0.4), [0.3, 0.3], 2.0, -0.6);
+        let turn = glam::Quat::from_rotation_x(2.1);
+        for (wo, _) in viewers() {
+            for wi in around().step_by(997) {
+                let [found, turned] = [
+                    hair.evaluate(wo, wi).value * wi.z.abs(),
+                    hair.evaluate(turn * wo, turn * wi).value * (turn * wi).z.abs(),
+                ];
+                let difference = (found - turned).abs().max_element();
+                assert!(difference < 1e-3 * (1.0 + found.max_element()), "{wo} {wi}");
             }
         }
     }

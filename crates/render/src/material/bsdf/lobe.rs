@@ -226,11 +226,6 @@ impl Lobes {
         self.lobes.iter().any(Lobe::is_anisotropic)
     }
 
-    /// Whether one of the lobes is a hair.
-    pub fn is_fiber(&self) -> bool {
-        self.lobes.iter().any(|lobe| matches!(lobe, Lobe::Hair(_)))
-    }
-
     /// Relative index of refraction, see [`super::Bsdf::eta`].
     pub fn eta(&self) -> f32 {
         let eta = self.lobes.iter().find_map(|lobe| match lobe {

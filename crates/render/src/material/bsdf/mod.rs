@@ -221,11 +221,6 @@ impl Bsdf {
         }
     }
 
-    /// Whether this is a fibre, of which only the outside scatters.
-    pub fn is_fiber(&self) -> bool {
-        matches!(self, Self::Lobes(lobes) if lobes.is_fiber())
-    }
-
     /// Index of refraction inside over outside of the lobe that spreads light to the other side. 1 without one.
     pub fn eta(&self) -> f32 {
         match self {
