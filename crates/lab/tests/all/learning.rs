@@ -26,6 +26,7 @@ fn kernel_geometry(geometry: &Geometry) -> antumbra::Geometry<'_> {
             center: sphere.center.to_array(),
             radius: sphere.radius,
         }]),
+        Geometry::Curves(_) => panic!("no curves here"),
     }
 }
 

@@ -13,7 +13,7 @@ fn read(text: &[u8]) -> Result<Model, Vec<String>> {
 fn mesh(shape: &Shape) -> &antumbra_scene::TriangleMesh {
     match &shape.geometry {
         Geometry::Mesh(mesh) => mesh,
-        Geometry::Sphere(_) => panic!("a sphere"),
+        Geometry::Sphere(_) | Geometry::Curves(_) => panic!("no mesh"),
     }
 }
 

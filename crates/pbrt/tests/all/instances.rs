@@ -66,6 +66,7 @@ fn x_of(scene: &Scene, shape: usize) -> f32 {
     match &flat.shapes[shape].geometry {
         Geometry::Mesh(mesh) => mesh.positions[0][0],
         Geometry::Sphere(sphere) => sphere.center.x,
+        Geometry::Curves(curves) => curves.points[0][0],
     }
 }
 

@@ -15,7 +15,7 @@ fn triangles(shapes: &[Shape], of_lights: bool) -> usize {
         .filter(|shape| shape.area_light.is_some() == of_lights)
         .map(|shape| match &shape.geometry {
             Geometry::Mesh(mesh) => mesh.indices.len(),
-            Geometry::Sphere(_) => 0,
+            Geometry::Sphere(_) | Geometry::Curves(_) => 0,
         })
         .sum()
 }

@@ -244,7 +244,7 @@ fn mirrors_and_glass_vanish_in_a_uniform_world() {
                 let found = mean(&picture(&scene, 32));
                 let tolerance = match geometry {
                     antumbra_scene::Geometry::Sphere(_) => 1e-4,
-                    antumbra_scene::Geometry::Mesh(_) => 0.03,
+                    _ => 0.03,
                 };
                 near(
                     found,

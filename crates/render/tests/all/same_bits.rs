@@ -239,6 +239,7 @@ fn mirrored(shape: &Shape, by: Vec3) -> Shape {
             }
         }
         Geometry::Sphere(sphere) => sphere.center = place(sphere.center),
+        Geometry::Curves(_) => panic!("no curves here"),
     }
     shape
 }

@@ -89,6 +89,10 @@ fn scaled(scene: &Scene, scale: f32) -> Scene {
                 sphere.center *= scale;
                 sphere.radius *= scale;
             }
+            Geometry::Curves(curves) => {
+                let numbers = Arc::make_mut(curves).points.as_flattened_mut();
+                numbers.iter_mut().for_each(|x| *x *= scale);
+            }
         }
     }
     for instance in &mut scene.instances {

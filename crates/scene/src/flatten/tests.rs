@@ -65,6 +65,7 @@ fn first_position(shape: &Shape) -> [f32; 3] {
     match &shape.geometry {
         Geometry::Mesh(mesh) => mesh.positions[0],
         Geometry::Sphere(sphere) => sphere.center.into(),
+        Geometry::Curves(_) => panic!("no curves here"),
     }
 }
 

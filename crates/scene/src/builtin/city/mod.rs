@@ -124,7 +124,7 @@ mod tests {
     fn meshes(scene: &Scene) -> impl Iterator<Item = &crate::TriangleMesh> {
         scene.shapes.iter().map(|shape| match &shape.geometry {
             Geometry::Mesh(mesh) => &**mesh,
-            Geometry::Sphere(_) => panic!("the city is made of triangles"),
+            Geometry::Sphere(_) | Geometry::Curves(_) => panic!("the city is made of triangles"),
         })
     }
 
