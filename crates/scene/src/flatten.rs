@@ -7,8 +7,8 @@ use crate::{Geometry, Scene, Shape};
 
 /// Largest number of triangles of a flattened scene.
 ///
-/// A shape counts as its triangles, as a third of its vertices, as twice the control points of its curves, or as one, whichever is most. Lowering and building
-/// take about 140 bytes per triangle, so the limit corresponds to about 19 GB.
+/// A shape counts as its triangles, as a third of its vertices, as twice the control points of its curves, or as one,
+/// whichever is most. Lowering and building take about 140 bytes per triangle, so the limit corresponds to about 19 GB.
 pub const MAX_FLAT_TRIANGLES: u64 = 1 << 27;
 
 /// Segments that stand for a control point of a curve.
