@@ -9,7 +9,7 @@ use glam::{Vec2, Vec3};
 use super::shapes::{Placement, Shapes};
 use super::triangle::gamma;
 
-/// Part of a curve for which a straight segment of the kernel stands: the number of the curve, and `u` at both ends.
+/// Part of a curve that a straight segment of the kernel replaces: the number of the curve, and `u` at both ends.
 pub type CurvePart = (u32, [f32; 2]);
 
 /// Distance of a curve from its segments, in radii. The bound of pbrt-v3.
