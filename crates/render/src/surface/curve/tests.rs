@@ -210,7 +210,9 @@ fn points_have_the_formulas_of_pbrt() {
                         expected.v
                     );
                     let off = (surface.point.as_dvec3() - expected.point).length();
-                    assert!(off < 2.0 * tolerance * expected.radius, "{what}: {off}");
+                    // A curve is a tenth of its largest radius away from its segments, which are seen at a slant.
+                    let bound = 0.4 * f64::from(curves.points[0][3]);
+                    assert!(off < bound + 1e-3, "{what}: {off}");
                     near(surface.normal, expected.normal, 4.0 * tolerance, &what);
                     near(patch.tangents[0], expected.tangents[0], 1e-4, &what);
                     near(
@@ -249,12 +251,14 @@ fn outlines_are_a_radius_away() {
         if !(0.01..0.99).contains(&nearest.1) {
             continue;
         }
+        let axis = Axis::new(&curves.control(0), nearest.1 as f32);
+        let margin = 0.01 + 0.1 * f64::from(curves.points[0][3] / axis.radius);
         match nearest.0 {
-            x if x < 0.88 => {
+            x if x < 1.0 - margin => {
                 assert!(bvh.occluded(&ray), "{number}: {nearest:?}");
                 inside += 1;
             }
-            x if x > 1.12 => {
+            x if x > 1.0 + margin => {
                 assert!(!bvh.occluded(&ray), "{number}: {nearest:?}");
                 outside += 1;
             }
@@ -264,11 +268,12 @@ fn outlines_are_a_radius_away() {
     assert!(inside > 1000 && outside > 100, "{inside} {outside}");
 }
 
-/// Rays that leave a straight curve never hit it again, and begin within three radii of their point.
+/// Few rays that leave a curve hit it again: only where it bends towards them or becomes wider. They begin within three radii
+/// of their point.
 #[test]
 fn rays_leave_curves() {
     for profile in [CurveProfile::Flat, CurveProfile::Round] {
-        for (curves, most) in [(straight(profile), 0), (bent(profile), 60)] {
+        for curves in [straight(profile), bent(profile)] {
             let (shapes, bvh) = of_world(shape(curves.clone(), false, false));
             let (mut again, mut count) = (0, 0);
             for number in 0..30_000 {
@@ -286,7 +291,7 @@ fn rays_leave_curves() {
                 count += 1;
             }
             assert!(
-                count > 10_000 && again <= most,
+                count > 10_000 && 100 * again <= count,
                 "{profile:?}: {again} of {count}"
             );
         }
