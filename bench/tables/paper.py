@@ -230,3 +230,23 @@ def leaf_rules_short():
                 pairs.append([our_tests(ours[scene, "simple", None]), our_tests(near(ours, scene, cost))])
             lines.append([scene, str(width)] + [", ".join(f"{a / b:.2f}" for a, b in zip(*pair)) for pair in pairs])
     return table(["scene", "children", "paper"] + [f"`{tree}`, C_p {cost:g}" for tree, cost in trees], lines)
+
+
+SKY_LIGHT = "zen3-2026-11-26-sky-light.csv"
+
+
+def sky_light():
+    """Sponza under its area light and under a sky, on the trees of pbrt-v3, with the paper's figures above."""
+    theirs, lines = paper_rows(), []
+    for width in (4, 8):
+        simple, sorted_ = (paper_tests(theirs, "sponza", width, order) for order in ("simple", "sort+"))
+        lines.append([str(width), "paper", "", "52 %", *(f"{x:.2f}" for x in simple), *(f"{a / b:.2f}" for a, b in zip(simple, sorted_))])
+        for tree in ("pbrt-2015", "pbrt"):
+            ours = preset_rows(width, tree, SKY_LIGHT)
+            cost = max(cost for _, _, cost in ours if cost is not None)
+            for scene, light in (("sponza", "area light"), ("sponza-sky", "sky")):
+                row, sorted_ = ours[scene, "simple", None], our_tests(ours[scene, "sort+", cost])
+                simple = our_tests(row)
+                share = f"{100 * number(row, 'shadow_share'):.0f} %"
+                lines.append([str(width), f"`{tree}`", light, share, *(f"{x:.2f}" for x in simple), *(f"{a / b:.2f}" for a, b in zip(simple, sorted_))])
+    return table(["children", "tree", "light", "shadow rays", "N_b `simple`", "N_t `simple`", "N_b gain of `sort+`", "N_t gain of `sort+`"], lines)

@@ -137,8 +137,12 @@ def of_the_paper(of):
     yield REPLICATION, f"`sort+` gains {two(gains, 2)} in N_b, and the paper reports {two(papers, 2)} in its own"
     unsorted = lambda tree: of.our_tests(of.preset_rows(4, tree, of.LEAF_RULES)["sponza", "simple", None])[0]
     base = of.paper_tests(theirs, "sponza", 4, "simple")[0]
-    today, eight = unsorted("pbrt") / base - 1, 1 - unsorted("binned-sah") / base
-    yield REPLICATION, f"is {100 * today:.0f} % larger with the rule of today, and {100 * eight:.0f} % smaller with leaves of eight"
+    yield REPLICATION, f"its unsorted N_b with 4 children is {100 * (unsorted('pbrt') / base - 1):.0f} % larger"
+    sky = lambda width: of.our_tests(of.preset_rows(width, "pbrt", of.SKY_LIGHT)["sponza-sky", "simple", None])[0]
+    off = [100 * abs(sky(w) / of.paper_tests(theirs, "sponza", w, "simple")[0] - 1) for w in (4, 8)]
+    yield REPLICATION, f"within {math.ceil(off[0])} % of the paper's with 4 children and the tree `pbrt`, and within {math.ceil(off[1])} % with 8"
+    share = 100 * of.number(of.preset_rows(4, "pbrt", of.SKY_LIGHT)["sponza", "simple", None], "shadow_share")
+    yield REPLICATION, f"which only upward surfaces face, they are {share:.0f} %"
     closed = []
     for rays, _ in of.RAYS:
         rows = {(r["scene"], r["technique"]): r for r in of.probe_rows("ways", rays, "binned-sah")}
@@ -334,6 +338,8 @@ SOURCES = {
         ("1 and 0.15; the preset today", "setting"),
         ("Of 36 163 node entries", "unrecorded"),
         ("52 % in the paper", "cited"),
+        ("shadow rays of sponza are 52 % of all rays", "cited"),
+        ("N_b is 2 % lower from the ground and from an arcade, and 26 % lower across", "unrecorded"),
         ("a C_p of 0.15 saves", "setting"),
         ("learned with 0.15", "setting"),
         ("whole pictures gain up to 1.2 |", "cited"),
