@@ -61,6 +61,9 @@ named_list! {
         Srdh if "lab" = "srdh",
             "Object splits by what training rays cost that stop at their first occluder",
             Some("Feltman, Lee and Fatahalian 2012"), Properties { needs_rays: true, ..Properties::PLAIN };
+        Vdbvh if "lab" = "vdbvh",
+            "Object splits by how many primitives rays see, blended with area",
+            Some("Vinkler, Havran and Sochor 2012"), Properties { needs_rays: true, ..Properties::PLAIN };
     }
 }
 

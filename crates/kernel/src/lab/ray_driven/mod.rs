@@ -10,7 +10,9 @@ use alloc::vec::Vec;
 
 pub(crate) mod evidence;
 pub(crate) mod rdh;
+pub(crate) mod seen;
 pub(crate) mod srdh;
+pub(crate) mod vdbvh;
 
 use crate::aabb::Aabb;
 use crate::builder::binned_sah;

@@ -1,0 +1,136 @@
+//! VDBVH: primitives that are seen count for more than primitives that are hidden.
+//!
+//! Source: Vinkler, Havran and Sochor (2012), "Visibility Driven BVH Build Up Algorithm for Ray Tracing": the chance that
+//! a ray which enters a node enters a child is the child's share of the visible primitives, mixed with its share of the
+//! area, `w O_child / O + (1 - w) A_child / A`. Nodes in which nothing is seen are split by areas. Choices made here:
+//! - [`crate::lab::ray_driven::seen`] says which primitives are seen, and how many rays are enough.
+//! - [`WEIGHT`] is `w`. The formula is from memory: only the abstract of the paper was available.
+//! - The contents of a child cost what [`crate::builder::cost`] says, for all primitives, seen or not.
+//! - Nodes in which nothing is seen are divided as finely as the others: answers need no visibility.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use super::{MAX_DEPTH, SEQUENTIAL, area};
+use crate::aabb::Aabb;
+use crate::builder::binned_sah;
+use crate::builder::cost::Cost;
+use crate::geometry::BLOCK;
+use crate::geometry::primitives::Primitives;
+use crate::lab::candidates::{Candidates, Part};
+use crate::lab::pieces::Piece;
+use crate::parallel;
+use crate::tree::binary::BinaryTree;
+
+/// Weight of visibility against area.
+pub(crate) const WEIGHT: f64 = 0.9;
+
+/// Builds the tree; `seen` has an entry for every primitive.
+pub(crate) fn build(primitives: &Primitives, seen: &[bool], weight: f64) -> BinaryTree {
+    if primitives.is_empty() {
+        return BinaryTree::default();
+    }
+    let prims = (0..primitives.len() as u32).collect();
+    let plan = Plan::new(primitives, seen, weight);
+    plan.piece(prims, 0).into_tree()
+}
+
+struct Plan<'a> {
+    primitives: &'a Primitives,
+    seen: &'a [bool],
+    weight: f64,
+    cost: Cost,
+}
+
+/// The split that is made: for each primitive, whether it goes left, and the bounds of both sides together.
+struct Split {
+    cost: f64,
+    is_left: Vec<bool>,
+    bounds: Aabb,
+}
+
+impl<'a> Plan<'a> {
+    fn new(primitives: &'a Primitives, seen: &'a [bool], weight: f64) -> Self {
+        Self {
+            primitives,
+            seen,
+            weight,
+            cost: Cost::new(),
+        }
+    }
+
+    fn piece(&self, prims: Vec<u32>, depth: u32) -> Piece {
+        let seen: Vec<_> = prims.iter().map(|prim| self.seen[*prim as usize]).collect();
+        let hidden = !seen.contains(&true);
+        if prims.len() <= BLOCK || hidden || depth >= MAX_DEPTH {
+            return binned_sah::piece(self.primitives, &prims, depth);
+        }
+        let Some(split) = self.best_split(&prims, &seen) else {
+            return binned_sah::piece(self.primitives, &prims, depth);
+        };
+        let is_large = prims.len() > SEQUENTIAL;
+        let mut sides = [Vec::new(), Vec::new()];
+        for (prim, is_left) in prims.into_iter().zip(split.is_left) {
+            sides[usize::from(!is_left)].push(prim);
+        }
+        let [left, right] = sides;
+        let (left, right) = if is_large {
+            parallel::join(
+                || self.piece(left, depth + 1),
+                || self.piece(right, depth + 1),
+            )
+        } else {
+            (self.piece(left, depth + 1), self.piece(right, depth + 1))
+        };
+        Piece::parent(split.bounds, left, right)
+    }
+
+    /// The split that costs least, the first of equals; `None` if there is none of finite cost.
+    fn best_split(&self, prims: &[u32], seen: &[bool]) -> Option<Split> {
+        let boxes: Vec<_> = prims
+            .iter()
+            .map(|prim| self.primitives.bounds_of(*prim as usize))
+            .collect();
+        let bounds = boxes.iter().fold(Aabb::EMPTY, |all, one| all.union(one));
+        let whole = seen.iter().filter(|seen| **seen).count();
+        let mut best: Option<Split> = None;
+        for axis in 0..3 {
+            let Some(candidates) = Candidates::new(&boxes, axis) else {
+                continue;
+            };
+            let left = seen_on_the_left(&candidates, seen);
+            for split in candidates.splits() {
+                let side = |part: &Part, seen: usize| {
+                    let share = area(&part.bounds) / area(&bounds);
+                    let share = if share.is_finite() { share } else { 1.0 };
+                    let chance =
+                        self.weight * seen as f64 / whole as f64 + (1.0 - self.weight) * share;
+                    chance * f64::from(self.cost.weight_of(part.count))
+                };
+                let cost = side(&candidates.left[split], left[split])
+                    + side(&candidates.right[split], whole - left[split]);
+                if cost < best.as_ref().map_or(f64::INFINITY, |best| best.cost) {
+                    let is_left = |bin: &u8| usize::from(*bin) < split;
+                    best = Some(Split {
+                        cost,
+                        is_left: candidates.bins.iter().map(is_left).collect(),
+                        bounds,
+                    });
+                }
+            }
+        }
+        best
+    }
+}
+
+/// Seen primitives on the left of each split.
+fn seen_on_the_left(candidates: &Candidates, seen: &[bool]) -> Vec<usize> {
+    let mut left = vec![0; candidates.len() + 1];
+    for (bin, seen) in candidates.bins.iter().zip(seen) {
+        left[usize::from(*bin) + 1] += usize::from(*seen);
+    }
+    for split in 1..left.len() {
+        left[split] += left[split - 1];
+    }
+    left
+}
