@@ -3,12 +3,14 @@
 use alloc::format;
 use alloc::vec::Vec;
 
+use crate::builder::Builder;
 use crate::builder::cost::Cost;
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::test_primitives::primitives;
 use crate::geometry::{Geometry, Instance, QueryKind};
 use crate::lab::ray_driven::evidence::AllEvidence;
 use crate::lab::ray_driven::rdh::Rdh;
+use crate::lab::ray_driven::seen::Seen;
 use crate::lab::ray_driven::srdh::Srdh;
 use crate::lab::ray_driven::*;
 use crate::learn::surface_rays::surface_rays;
@@ -304,5 +306,88 @@ fn srdh_predicts_the_work_of_rays_drawn_from_its_model() {
             (found - predicted).abs() < error,
             "seed {seed}: {found} {predicted}"
         );
+    }
+}
+
+/// What is seen is the nearest on some ray, by brute force, in the world and in objects.
+#[test]
+fn seen_is_what_is_nearest() {
+    let mut rng = Rng::new(77);
+    let [object, world] = [(); 2].map(|()| mesh::soup(&mut rng, 200));
+    let [object, world] =
+        [&object, &world].map(|mesh| [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])]);
+    let instance = Instance {
+        object: 0,
+        transform: core::array::from_fn(|row| {
+            core::array::from_fn(|column| f32::from(u8::from(row == column)))
+        }),
+    };
+    let primitives =
+        Primitives::with_instances(&world, &[object], &[instance]).expect("indices in range");
+    let rays: Vec<_> = (0..300)
+        .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
+        .collect();
+    let tree = crate::tree::binary::BinaryTree::build(&primitives, Builder::BinnedSah);
+    let mut seen = Seen::none(&primitives);
+    seen.follow(&primitives, &tree, &rays);
+    for (primitives, seen) in [
+        (&primitives, &seen.world),
+        (&primitives.objects[0], &seen.objects[0]),
+    ] {
+        let mut expected = alloc::vec![false; primitives.len()];
+        for ray in &rays {
+            let setup = RaySetup::new(ray, 10.0).expect("a ray");
+            let hits = (0..primitives.len()).filter_map(|prim| {
+                let hit = primitives.hit(prim, &setup, QueryKind::Occluded)?;
+                primitives.instance(prim).is_none().then_some((hit.t, prim))
+            });
+            if let Some((_, prim)) = hits.min_by(|a, b| a.0.total_cmp(&b.0)) {
+                expected[prim] = true;
+            }
+        }
+        assert_eq!(seen, &expected);
+        let count = seen.iter().filter(|seen| **seen).count();
+        assert!(count > 20 && count < primitives.len(), "{count}");
+    }
+}
+
+/// The split that VDBVH makes costs what the formula says of its two sides, and no other candidate costs less.
+#[test]
+fn vdbvh_makes_the_split_of_least_cost() {
+    let mut rng = Rng::new(78);
+    let cost = Cost::new();
+    for weight in [0.0, 0.5, 0.9, 1.0] {
+        let mesh = mesh::soup(&mut rng, 400);
+        let primitives = primitives(&mesh, 5, &mut rng);
+        let seen: Vec<_> = (0..primitives.len()).map(|_| rng.below(4) == 0).collect();
+        let prims: Vec<u32> = (0..primitives.len() as u32).collect();
+        let boxes: Vec<_> = prims
+            .iter()
+            .map(|prim| primitives.bounds_of(*prim as usize))
+            .collect();
+        let union = |on: &dyn Fn(usize) -> bool| {
+            let boxes = boxes.iter().enumerate().filter(|one| on(one.0));
+            boxes.fold(Aabb::EMPTY, |all, one| all.union(one.1))
+        };
+        let whole = area(&union(&|_| true));
+        let visible = seen.iter().filter(|seen| **seen).count() as f64;
+        let of = |is_left: &dyn Fn(usize) -> bool| -> f64 {
+            let side = |on: &dyn Fn(usize) -> bool| {
+                let inside: Vec<_> = (0..boxes.len()).filter(|prim| on(*prim)).collect();
+                let seen = inside.iter().filter(|prim| seen[**prim]).count() as f64;
+                let chance = weight * seen / visible + (1.0 - weight) * area(&union(on)) / whole;
+                chance * f64::from(cost.weight_of(inside.len()))
+            };
+            side(is_left) + side(&|prim| !is_left(prim))
+        };
+        let split = vdbvh::split_of(&primitives, &prims, &seen, weight).expect("a split");
+        assert!((split.cost - of(&|prim| split.is_left[prim])).abs() < 1e-9);
+        for axis in 0..3 {
+            let candidates = Candidates::new(&boxes, axis).expect("splits");
+            for place in candidates.splits() {
+                let found = of(&|prim| usize::from(candidates.bins[prim]) < place);
+                assert!(split.cost <= found + 1e-9, "weight {weight} axis {axis}");
+            }
+        }
     }
 }

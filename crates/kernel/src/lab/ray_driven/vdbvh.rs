@@ -35,6 +35,17 @@ pub(crate) fn build(primitives: &Primitives, seen: &[bool], weight: f64) -> Bina
     plan.piece(prims, 0).into_tree()
 }
 
+/// The first split of some primitives.
+#[cfg(test)]
+pub(super) fn split_of(
+    primitives: &Primitives,
+    prims: &[u32],
+    seen: &[bool],
+    weight: f64,
+) -> Option<Split> {
+    Plan::new(primitives, seen, weight).best_split(prims, seen)
+}
+
 struct Plan<'a> {
     primitives: &'a Primitives,
     seen: &'a [bool],
@@ -43,9 +54,9 @@ struct Plan<'a> {
 }
 
 /// The split that is made: for each primitive, whether it goes left, and the bounds of both sides together.
-struct Split {
-    cost: f64,
-    is_left: Vec<bool>,
+pub(super) struct Split {
+    pub cost: f64,
+    pub is_left: Vec<bool>,
     bounds: Aabb,
 }
 
