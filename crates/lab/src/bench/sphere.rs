@@ -59,7 +59,7 @@ mod tests {
     #[test]
     fn spheres_become_closed_meshes_that_face_outward() {
         let (center, radius) = (Vec3::new(1.0, -2.0, 3.0), 0.5);
-        let mesh = triangulate(&Sphere { center, radius });
+        let mesh = triangulate(&Sphere::new(center, radius));
         let mut edges: HashMap<[u32; 2], i32> = HashMap::new();
         let mut volume = 0.0;
         for &triangle in &mesh.indices {
