@@ -104,6 +104,12 @@ impl Isa {
         Level::available().map(Self)
     }
 
+    /// The instruction set of a token, which proves that the CPU has it.
+    #[inline(always)]
+    pub fn of<S: Simd>(_: S) -> Self {
+        Self(S::LEVEL)
+    }
+
     /// The level that was checked.
     pub fn level(self) -> Level {
         self.0
@@ -149,6 +155,18 @@ pub trait Simd: Copy + Send + Sync + 'static + Width<4> + Width<8> + Width<16> {
             *lanes = <Self as Width<16>>::Lanes::load(self, column);
         }
         lanes
+    }
+
+    /// Transposes 8 rows into 8 columns: lane `i` of vector `j` is `rows[i][j]`.
+    #[inline(always)]
+    fn transpose(self, rows: &[[f32; 8]; 8]) -> [<Self as Width<8>>::Lanes; 8] {
+        let mut columns = [[0.0; 8]; 8];
+        for (lane, row) in rows.iter().enumerate() {
+            for (column, &value) in columns.iter_mut().zip(row) {
+                column[lane] = value;
+            }
+        }
+        columns.map(|column| <Self as Width<8>>::Lanes::load(self, &column))
     }
 
     /// Prefetches every cache line of a value. Does nothing on CPUs without a prefetch instruction.

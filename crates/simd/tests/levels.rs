@@ -360,12 +360,36 @@ impl WithSimd<16> for Columns<'_> {
     }
 }
 
+/// Runs the transposition of eight rows.
+struct Transposed<'a>(&'a [[f32; 8]; 8]);
+
+impl WithSimd<8> for Transposed<'_> {
+    type Output = [[f32; 8]; 8];
+
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<8>>(self, simd: S) -> Self::Output {
+        assert_eq!(Isa::of(simd).level(), S::LEVEL);
+        let mut columns = [[0.0; 8]; 8];
+        for (column, lanes) in columns.iter_mut().zip(simd.transpose(self.0)) {
+            lanes.store(column);
+        }
+        columns
+    }
+}
+
 #[test]
 fn columns_hold_what_rows_hold() {
     let rows: [[f32; 8]; 16] =
         core::array::from_fn(|lane| core::array::from_fn(|column| (100 * lane + column) as f32));
     for isa in Isa::available() {
         let columns = isa.dispatch(Columns(&rows));
+        for (column, lanes) in columns.iter().enumerate() {
+            for (lane, &value) in lanes.iter().enumerate() {
+                assert_eq!(value, rows[lane][column], "{}", isa.level());
+            }
+        }
+        let (first, _) = rows.as_chunks::<8>();
+        let columns = isa.dispatch(Transposed(&first[0]));
         for (column, lanes) in columns.iter().enumerate() {
             for (lane, &value) in lanes.iter().enumerate() {
                 assert_eq!(value, rows[lane][column], "{}", isa.level());

@@ -3,12 +3,15 @@
 use alloc::borrow::Cow;
 use core::f64::consts::PI;
 
+use antumbra_simd::{Dispatch, Isa, Lanes, Mask, Simd, Width, WithSimd};
+
 use crate::aabb::Aabb;
 use crate::geometry::instance::{cross, dot};
 use crate::geometry::nearest::{Near, Place, minus};
 use crate::geometry::primitives::dropped::DropReason;
-use crate::geometry::ray_setup::RaySetup;
+use crate::geometry::ray_setup::{RaySetup, max};
 use crate::geometry::scalar::{ScalarPrim, ScalarShape, SurfacePoint, clamped, is_finite_box};
+use crate::geometry::triangle::Vector;
 use crate::geometry::{BLOCK, Geometry};
 use crate::hash::Random;
 use crate::math;
@@ -103,34 +106,45 @@ impl<'a> Curves<'a> {
             second.is_some() && neighbour(place.checked_add(1)) == second,
         ];
         let sign = |goes_on: bool| if goes_on { -1.0 } else { 1.0 };
-        let segment = CurveSegment {
-            ends: ends.map(|[x, y, z, _]| [x, y, z]),
-            radii: [0, 1].map(|end| radii[end].copysign(sign(goes_on[end]))),
-        };
-        Some(segment.checked())
+        let points = [0, 1].map(|end| {
+            let [x, y, z, radius] = ends[end];
+            [x, y, z, radius.copysign(sign(goes_on[end]))]
+        });
+        Some(CurveSegment { points }.checked())
     }
 }
 
 /// A segment of a curve.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CurveSegment {
-    ends: [[f32; 3]; 2],
-    /// Radii at the ends. The sign bit is set where the curve goes on.
-    radii: [f32; 2],
+    /// Position and radius of both ends. The sign bit of a radius is set where the curve goes on.
+    points: [[f32; 4]; 2],
 }
 
 impl CurveSegment {
+    fn ends(&self) -> [[f32; 3]; 2] {
+        self.points.map(|[x, y, z, _]| [x, y, z])
+    }
+
+    fn radii(&self) -> [f32; 2] {
+        self.points.map(|[.., radius]| radius)
+    }
+
     /// The segment, if it can be kept.
     fn checked(self) -> Result<Self, DropReason> {
-        let [a, b] = self.ends;
+        let [a, b] = self.ends();
         // Bounds ignore NaN.
-        if !a.iter().chain(&b).chain(&self.radii).all(|x| x.is_finite())
+        if !a
+            .iter()
+            .chain(&b)
+            .chain(&self.radii())
+            .all(|x| x.is_finite())
             || !is_finite_box(&self.bounds())
         {
             Err(DropReason::NotFinite)
         } else if a == b {
             Err(DropReason::CornersCoincide)
-        } else if self.radii[0] == 0.0 && self.radii[1] == 0.0 {
+        } else if self.radii()[0] == 0.0 && self.radii()[1] == 0.0 {
             Err(DropReason::NoRadius)
         } else {
             Ok(self)
@@ -138,17 +152,17 @@ impl CurveSegment {
     }
 
     fn goes_on(&self, end: usize) -> bool {
-        self.radii[end].is_sign_negative()
+        self.radii()[end].is_sign_negative()
     }
 
     /// Radius at a share of the length.
     fn radius(&self, share: f64) -> f64 {
-        let [first, second] = self.radii.map(|radius| f64::from(radius.abs()));
+        let [first, second] = self.radii().map(|radius| f64::from(radius.abs()));
         (1.0 - share) * first + share * second
     }
 
     fn axis(&self) -> [f64; 3] {
-        let [a, b] = self.ends.map(|end| end.map(f64::from));
+        let [a, b] = self.ends().map(|end| end.map(f64::from));
         minus(b, a)
     }
 }
@@ -157,8 +171,8 @@ impl ScalarShape for CurveSegment {
     /// Of the spheres around both ends, rounded outwards: the ray passes a point of the axis at a distance of at most its
     /// radius.
     fn bounds(&self) -> Aabb {
-        let [a, b] = self.ends;
-        let [r, s] = self.radii.map(f32::abs);
+        let [a, b] = self.ends();
+        let [r, s] = self.radii().map(f32::abs);
         Aabb {
             min: core::array::from_fn(|i| (a[i] - r).min(b[i] - s).next_down()),
             max: core::array::from_fn(|i| (a[i] + r).max(b[i] + s).next_up()),
@@ -168,7 +182,7 @@ impl ScalarShape for CurveSegment {
     /// In double precision, which the levels share, so the bits are the same on all of them.
     fn hit(&self, _: u32, ray: &RaySetup, _: f32) -> Option<[f32; 3]> {
         let [org, dir] = [ray.org, ray.dir].map(|vector| vector.map(f64::from));
-        let to_first = minus(self.ends[0].map(f64::from), org);
+        let to_first = minus(self.ends()[0].map(f64::from), org);
         let axis = self.axis();
         let length2 = dot(dir, dir);
         let [first_along, axis_along] = [to_first, axis].map(|way| dot(way, dir) / length2);
@@ -220,7 +234,7 @@ impl ScalarShape for CurveSegment {
 
     /// Nearest point on the axis, not on the surface.
     fn near(&self, _: u32, place: &Place<'_>) -> Option<Near> {
-        let [a, b] = self.ends.map(|end| place.in_world(end));
+        let [a, b] = self.ends().map(|end| place.in_world(end));
         let axis = minus(b, a);
         let share = dot(minus(place.point, a), axis) / dot(axis, axis);
         // An instance may flatten a segment to a point.
@@ -250,7 +264,7 @@ impl ScalarShape for CurveSegment {
         let radius = self.radius(share);
         SurfacePoint {
             position: core::array::from_fn(|i| {
-                f64::from(self.ends[0][i]) + share * axis[i] + radius * normal[i]
+                f64::from(self.ends()[0][i]) + share * axis[i] + radius * normal[i]
             }),
             normal,
         }
@@ -270,8 +284,7 @@ const WIDER: f32 = 1.0 + 1.0 / 64.0;
 impl ScalarPrim for CurveSegment {
     const NAME: &'static str = "curves";
     const NOTHING: Self = Self {
-        ends: [[0.0; 3]; 2],
-        radii: [0.0; 2],
+        points: [[0.0; 4]; 2],
     };
     const NUMBERS: usize = 8;
 
@@ -283,38 +296,14 @@ impl ScalarPrim for CurveSegment {
     /// from the slope there, `g = s e² + a e`: by `g² / e²` of its square. `g` is 0 but for roundings, which for a ray
     /// that hits, with `|a| <= r + |e|`, are at most `(28 u R + 116 u |axis|) |e|` and a share of `r`. As `|axis|` is at
     /// most `3.5 R`, that is less than `PLACE R |e|`.
-    #[inline(always)]
-    fn candidates(segments: &[Self; BLOCK], count: usize, ray: &RaySetup) -> u32 {
+    // Away from the loops, and compiled for the level from wherever it is called.
+    #[inline(never)]
+    fn candidates<S: Simd>(simd: S, segments: &[Self; BLOCK], count: usize, ray: &RaySetup) -> u32 {
         let all = (1 << count) - 1;
-        if ray.extreme {
-            return all;
+        match ray.extreme {
+            true => all,
+            false => all & !Isa::of(simd).dispatch(Misses { segments, ray }),
         }
-        let largest = ray.dir.iter().fold(0.0, |most: f32, x| most.max(x.abs()));
-        let dir = ray.dir.map(|x| x / largest);
-        let dot = |a: [f32; 3], b: [f32; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let per_length2 = 1.0 / dot(dir, dir);
-        let (across, place) = (ACROSS * ray.reach(), PLACE * ray.reach());
-        let mut misses = [false; BLOCK];
-        for (segment, misses) in segments.iter().zip(&mut misses) {
-            let [first, second] = segment.ends;
-            let seen = |way: [f32; 3]| -> [f32; 3] {
-                let along = dot(way, dir) * per_length2;
-                [0, 1, 2].map(|i| way[i] - along * dir[i])
-            };
-            let axis = [0, 1, 2].map(|i| second[i] - first[i]);
-            let a = seen([0, 1, 2].map(|i| first[i] - ray.org[i]));
-            let e = seen(axis);
-            let length2 = dot(e, e);
-            let share = (-dot(a, e) / length2).clamp(0.0, 1.0);
-            let off = [0, 1, 2].map(|i| a[i] + share * e[i]);
-            let [r, s] = segment.radii.map(f32::abs);
-            let wide = WIDER * (if r > s { r } else { s }) + across;
-            // NaN is no miss.
-            *misses =
-                length2 > SEEN2 * dot(axis, axis) && dot(off, off) > wide * wide + place * place;
-        }
-        let bits = (misses.iter().enumerate()).map(|(lane, &misses)| u32::from(misses) << lane);
-        all & !bits.sum::<u32>()
     }
 
     fn count(geometry: &Geometry<'_>) -> usize {
@@ -331,23 +320,91 @@ impl ScalarPrim for CurveSegment {
         }
     }
 
+    #[inline(always)]
     fn numbers(&self) -> [f32; 8] {
-        let [[a, b, c], [x, y, z]] = self.ends;
-        [a, b, c, self.radii[0], x, y, z, self.radii[1]]
+        let [[a, b, c, r], [x, y, z, s]] = self.points;
+        [a, b, c, r, x, y, z, s]
     }
 
-    fn from_numbers([a, b, c, first, x, y, z, second]: [f32; 8]) -> Result<Self, DropReason> {
-        let segment = Self {
-            ends: [[a, b, c], [x, y, z]],
-            radii: [first, second],
-        };
-        segment.checked()
+    fn from_numbers([a, b, c, r, x, y, z, s]: [f32; 8]) -> Result<Self, DropReason> {
+        let points = [[a, b, c, r], [x, y, z, s]];
+        Self { points }.checked()
+    }
+}
+
+/// Which segments a ray misses, as bits.
+struct Misses<'a> {
+    segments: &'a [CurveSegment; BLOCK],
+    ray: &'a RaySetup,
+}
+
+/// Three coordinates, a segment per lane.
+type Vectors<S> = [Vector<S>; 3];
+
+#[inline(always)]
+fn splat<S: Simd>(simd: S, [x, y, z]: [f32; 3]) -> Vectors<S> {
+    [
+        Vector::<S>::splat(simd, x),
+        Vector::<S>::splat(simd, y),
+        Vector::<S>::splat(simd, z),
+    ]
+}
+
+#[inline(always)]
+fn dots<S: Simd>(a: Vectors<S>, b: Vectors<S>) -> Vector<S> {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// `a + factor * b`
+#[inline(always)]
+fn plus<S: Simd>(a: Vectors<S>, factor: Vector<S>, b: Vectors<S>) -> Vectors<S> {
+    [
+        a[0] + factor * b[0],
+        a[1] + factor * b[1],
+        a[2] + factor * b[2],
+    ]
+}
+
+impl WithSimd<BLOCK> for Misses<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn with_simd<S: Simd + Width<BLOCK>>(self, simd: S) -> u32 {
+        let Self { segments, ray } = self;
+        let mut rows = [[0.0; 8]; BLOCK];
+        for lane in 0..BLOCK {
+            rows[lane] = segments[lane].numbers();
+        }
+        let [ax, ay, az, r, bx, by, bz, s] = simd.transpose(&rows);
+        let [x, y, z] = ray.dir;
+        let largest = max(max(x.abs(), y.abs()), z.abs());
+        let [x, y, z] = [x / largest, y / largest, z / largest];
+        let dir = splat(simd, [x, y, z]);
+        let [ox, oy, oz] = splat(simd, ray.org);
+        let zero = Vector::<S>::splat(simd, 0.0);
+        let minus_per_length2 = Vector::<S>::splat(simd, -1.0 / (x * x + y * y + z * z));
+        let (from, axis) = ([ax - ox, ay - oy, az - oz], [bx - ax, by - ay, bz - az]);
+        // As seen along the ray.
+        let a = plus::<S>(from, dots::<S>(from, dir) * minus_per_length2, dir);
+        let e = plus::<S>(axis, dots::<S>(axis, dir) * minus_per_length2, dir);
+        let length2 = dots::<S>(e, e);
+        let share = (zero - dots::<S>(a, e)) / length2;
+        let share = share.max(zero).min(Vector::<S>::splat(simd, 1.0));
+        let off = plus::<S>(a, share, e);
+        let across = Vector::<S>::splat(simd, ACROSS * ray.reach());
+        let place = PLACE * ray.reach();
+        let wide = Vector::<S>::splat(simd, WIDER) * r.max_size(s) + across;
+        let least = wide * wide + Vector::<S>::splat(simd, place * place);
+        // NaN is no miss.
+        let is_seen = (Vector::<S>::splat(simd, SEEN2) * dots::<S>(axis, axis)).lt(length2);
+        (is_seen & least.lt(dots::<S>(off, off))).bits()
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use antumbra_simd::Scalar;
     use antumbra_testkit::Rng;
 
     /// Whatever is hit is a candidate, however thin the segment, however far away the ray begins, also at the very edge.
@@ -364,11 +421,12 @@ mod tests {
             let way = rng.direction();
             let to = [0, 1, 2].map(|axis| from[axis] + length * way[axis]);
             let sign = |rng: &mut Rng| if rng.below(2) == 0 { 1.0 } else { -1.0 };
-            let segment = CurveSegment {
-                ends: [from, to],
-                radii: [radius, radius * rng.unit()].map(|radius| radius * sign(&mut rng)),
-            };
-            let Ok(segment) = segment.checked() else {
+            let radii = [radius, radius * rng.unit()].map(|radius| radius * sign(&mut rng));
+            let points = [0, 1].map(|end| {
+                let [x, y, z] = [from, to][end];
+                [x, y, z, radii[end]]
+            });
+            let Ok(segment) = (CurveSegment { points }).checked() else {
                 continue;
             };
             let segments = [segment; BLOCK];
@@ -395,7 +453,14 @@ mod tests {
                 continue;
             };
             let is_hit = segment.hit(0, &ray, ray.tfar).is_some();
-            let found = CurveSegment::candidates(&segments, BLOCK, &ray);
+            let found = CurveSegment::candidates(Scalar, &segments, BLOCK, &ray);
+            for isa in Isa::available() {
+                let misses = isa.dispatch(Misses {
+                    segments: &segments,
+                    ray: &ray,
+                });
+                assert!(ray.extreme || misses == !found & 0xff, "{}", isa.level());
+            }
             assert!(found == 0 || found == 0xff, "all lanes are the same");
             assert!(!is_hit || found == 0xff, "{segment:?} {:?}", *ray);
             hits += usize::from(is_hit);

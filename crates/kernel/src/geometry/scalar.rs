@@ -79,7 +79,7 @@ pub(crate) trait ScalarPrim:
 
     /// Which of the first `count` primitives a ray may hit, as bits. A kind may rule some out cheaply.
     #[inline(always)]
-    fn candidates(_: &[Self; BLOCK], count: usize, _: &RaySetup) -> u32 {
+    fn candidates<S: Simd>(_: S, _: &[Self; BLOCK], count: usize, _: &RaySetup) -> u32 {
         (1 << count) - 1
     }
 
@@ -194,8 +194,8 @@ impl<P: ScalarPrim> LeafBlock for ScalarBlock<P> {
     }
 
     #[inline(always)]
-    fn candidates<S: Simd, const STREAM: bool>(&self, _: S, ray: &RaySetup, _: f32) -> LanesOf {
-        LanesOf(P::candidates(&self.prims, self.count, ray))
+    fn candidates<S: Simd, const STREAM: bool>(&self, simd: S, ray: &RaySetup, _: f32) -> LanesOf {
+        LanesOf(P::candidates(simd, &self.prims, self.count, ray))
     }
 
     fn hit(&self, lane: usize, ray: &RaySetup, _: &Filters, _: QueryKind) -> Option<Hit> {

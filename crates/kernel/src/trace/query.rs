@@ -214,6 +214,10 @@ pub(super) fn lanes_in_stream<S: Simd, const N: usize>(
             let block = &bvh.blocks.triangles[leaf.index];
             block.candidates::<S, true>(simd, ray, limit).0
         }
+        PrimKind::Curve => {
+            let block = &bvh.blocks.curves[leaf.index];
+            block.candidates::<S, true>(simd, ray, limit).0
+        }
         _ => other_lanes(bvh, leaf, ray, limit),
     }
 }
@@ -289,6 +293,13 @@ impl StreamQuery for Occlusion {
     ) -> u32 {
         let lanes = match leaf.kind {
             PrimKind::Triangle => bvh.blocks.triangles[leaf.index].occluders::<S, true>(simd, ray),
+            PrimKind::Curve => {
+                let block = &bvh.blocks.curves[leaf.index];
+                match decides {
+                    true => block.occluders::<S, true>(simd, ray),
+                    false => (block.occluded(simd, ray, &bvh.filters)).map_or(0, |lane| 1 << lane),
+                }
+            }
             _ => other_occluders(bvh, leaf, ray, decides),
         };
         let is_left = decides && lanes != 0;

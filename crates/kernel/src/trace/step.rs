@@ -75,6 +75,7 @@ pub(crate) fn leaf_occluder<S: Simd, const N: usize>(
     match kind {
         PrimKind::Triangle => bvh.blocks.triangles[index].occluded::<S>(simd, ray, &bvh.filters),
         PrimKind::Cutout => bvh.blocks.cutouts[index].occluded::<S>(simd, ray, &bvh.filters),
+        PrimKind::Curve => bvh.blocks.curves[index].occluded::<S>(simd, ray, &bvh.filters),
         _ => scalar_occluder(bvh, leaf, ray),
     }
 }

@@ -18,15 +18,32 @@ impl Simd for Avx2 {
         let (halves, _) = rows.as_chunks::<8>();
         // SAFETY: the token proves the CPU has the instructions.
         let (low, high) = unsafe { (transpose_8(&halves[0]), transpose_8(&halves[1])) };
+        let pair = |i: usize| Pair::new(F32x8(low[i]), F32x8(high[i]));
         [
-            Pair::new(low[0], high[0]),
-            Pair::new(low[1], high[1]),
-            Pair::new(low[2], high[2]),
-            Pair::new(low[3], high[3]),
-            Pair::new(low[4], high[4]),
-            Pair::new(low[5], high[5]),
-            Pair::new(low[6], high[6]),
-            Pair::new(low[7], high[7]),
+            pair(0),
+            pair(1),
+            pair(2),
+            pair(3),
+            pair(4),
+            pair(5),
+            pair(6),
+            pair(7),
+        ]
+    }
+
+    #[inline(always)]
+    fn transpose(self, rows: &[[f32; 8]; 8]) -> [F32x8; 8] {
+        // SAFETY: the token proves the CPU has the instructions.
+        let [a, b, c, d, e, f, g, h] = unsafe { transpose_8(rows) };
+        [
+            F32x8(a),
+            F32x8(b),
+            F32x8(c),
+            F32x8(d),
+            F32x8(e),
+            F32x8(f),
+            F32x8(g),
+            F32x8(h),
         ]
     }
 }
@@ -36,7 +53,7 @@ impl Simd for Avx2 {
 /// # Safety
 /// The CPU must have AVX.
 #[inline(always)]
-unsafe fn transpose_8(rows: &[[f32; 8]; 8]) -> [F32x8; 8] {
+pub(super) unsafe fn transpose_8(rows: &[[f32; 8]; 8]) -> [__m256; 8] {
     // SAFETY: the caller's promise; eight floats are readable at each row.
     unsafe {
         let low = transpose_blocks([
@@ -52,14 +69,14 @@ unsafe fn transpose_8(rows: &[[f32; 8]; 8]) -> [F32x8; 8] {
             _mm256_loadu_ps(rows[7].as_ptr()),
         ]);
         [
-            F32x8(_mm256_permute2f128_ps::<0x20>(low[0], high[0])),
-            F32x8(_mm256_permute2f128_ps::<0x20>(low[1], high[1])),
-            F32x8(_mm256_permute2f128_ps::<0x20>(low[2], high[2])),
-            F32x8(_mm256_permute2f128_ps::<0x20>(low[3], high[3])),
-            F32x8(_mm256_permute2f128_ps::<0x31>(low[0], high[0])),
-            F32x8(_mm256_permute2f128_ps::<0x31>(low[1], high[1])),
-            F32x8(_mm256_permute2f128_ps::<0x31>(low[2], high[2])),
-            F32x8(_mm256_permute2f128_ps::<0x31>(low[3], high[3])),
+            _mm256_permute2f128_ps::<0x20>(low[0], high[0]),
+            _mm256_permute2f128_ps::<0x20>(low[1], high[1]),
+            _mm256_permute2f128_ps::<0x20>(low[2], high[2]),
+            _mm256_permute2f128_ps::<0x20>(low[3], high[3]),
+            _mm256_permute2f128_ps::<0x31>(low[0], high[0]),
+            _mm256_permute2f128_ps::<0x31>(low[1], high[1]),
+            _mm256_permute2f128_ps::<0x31>(low[2], high[2]),
+            _mm256_permute2f128_ps::<0x31>(low[3], high[3]),
         ]
     }
 }

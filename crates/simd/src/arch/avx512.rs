@@ -2,6 +2,7 @@
 
 use core::arch::x86_64::*;
 
+use super::avx2::transpose_8;
 use super::pair::Pair;
 use crate::lanes::{Lanes, Mask, sort_pairs};
 use crate::level::{Level, Simd, Width, WithSimd};
@@ -62,6 +63,22 @@ impl Simd for Avx512 {
                 F32x16(_mm512_shuffle_f32x4::<0b11_01_11_01>(low[3], high[3])),
             ]
         }
+    }
+
+    #[inline(always)]
+    fn transpose(self, rows: &[[f32; 8]; 8]) -> [F32x8; 8] {
+        // SAFETY: the token proves the CPU has the instructions.
+        let [a, b, c, d, e, f, g, h] = unsafe { transpose_8(rows) };
+        [
+            F32x8(a),
+            F32x8(b),
+            F32x8(c),
+            F32x8(d),
+            F32x8(e),
+            F32x8(f),
+            F32x8(g),
+            F32x8(h),
+        ]
     }
 }
 
