@@ -34,7 +34,7 @@ use crate::ray::{Hit, Ray};
 /// the last end of a chain are cut off flat.
 ///
 /// `u` of a hit is `s`. `v` goes from 0 at one side over 1/2 on the axis to 1 at the other side, which is on the left of
-/// the axis for someone who looks along the ray with up along the axis. [`Bvh::normal`](crate::Bvh::normal) is
+/// the axis for someone who looks along the ray with up along the axis. At a joint it counts across the axis too. [`Bvh::normal`](crate::Bvh::normal) is
 /// perpendicular to the axis and faces the ray. A ray may hit several segments of a curve.
 ///
 /// [`Bvh::closest`](crate::Bvh::closest) and its relatives find the nearest point of the axis. Curves have no inside.
@@ -211,7 +211,14 @@ impl ScalarShape for CurveSegment {
             return None;
         }
         let t = clamped(&self.bounds(), t, ray)?;
-        let side = math::sqrt(distance2) / radius;
+        // At a joint as well v counts across the axis, so that it goes on from segment to segment.
+        let off = if share == foot {
+            distance2
+        } else {
+            let along = dot(nearest, axis);
+            (distance2 - along * along / seen_length2).max(0.0)
+        };
+        let side = math::sqrt(off) / radius;
         // The vector goes from the ray to the axis.
         let is_right = dot(cross(axis, dir), nearest) > 0.0;
         let v = 0.5 + if is_right { -0.5 * side } else { 0.5 * side };

@@ -172,8 +172,9 @@ proptest! {
                 if let Some(hit) = found {
                     prop_assert!((f64::from(hit.t) - t).abs() < 1e-4, "{} {}", hit.t, t);
                     prop_assert!((f64::from(hit.u) - share).abs() < 1e-4);
+                    // Across the axis, also at a joint.
                     let side = (f64::from(hit.v) - 0.5).abs();
-                    prop_assert!((side - 0.5 * distance(share) / radius).abs() < 1e-4);
+                    prop_assert!((side - 0.5 * distance(foot) / radius).abs() < 1e-4);
                 }
             }
         }

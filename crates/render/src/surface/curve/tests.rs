@@ -76,23 +76,28 @@ fn bent(profile: CurveProfile) -> Curves {
     }
 }
 
-/// A straight curve along which u is not proportional to the length.
+/// A straight curve of a changing radius, which one segment replaces.
 fn straight(profile: CurveProfile) -> Curves {
     let at = |share: f32, radius: f32| {
         let point = Vec3::new(-0.5, 0.3, 0.2).lerp(Vec3::new(1.0, 1.5, -0.6), share);
         point.extend(radius).to_array()
     };
     Curves {
-        points: vec![at(0.0, 0.1), at(0.2, 0.09), at(0.5, 0.08), at(1.0, 0.07)],
+        points: vec![
+            at(0.0, 0.1),
+            at(1.0 / 3.0, 0.09),
+            at(2.0 / 3.0, 0.08),
+            at(1.0, 0.07),
+        ],
         first: vec![0],
         profile,
     }
 }
 
-/// A ray past a point of the curve, at most 1.3 radii away from it.
-fn ray_at(curves: &Curves, stream: &Stream) -> Ray {
+/// A ray past a point of the curve, at most so many radii away from it.
+fn ray_at(curves: &Curves, stream: &Stream, radii: f32) -> Ray {
     let axis = Axis::new(&curves.control(0), 0.02 + 0.96 * stream.uniform(1));
-    let aside = uniform_sphere(stream.pair(2)) * (1.3 * axis.radius * stream.uniform(4));
+    let aside = uniform_sphere(stream.pair(2)) * (radii * axis.radius * stream.uniform(4));
     let dir = uniform_sphere(stream.pair(5));
     Ray::new(
         (axis.point + aside - dir * 3.0).to_array(),
@@ -180,7 +185,7 @@ fn points_have_the_formulas_of_pbrt() {
     let turn = DMat4::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 1.3);
     let mut tried = 0;
     for profile in [CurveProfile::Flat, CurveProfile::Round] {
-        for (curves, tolerance) in [(straight(profile), 2e-3), (bent(profile), 0.12)] {
+        for (curves, tolerance) in [(straight(profile), 2e-3), (bent(profile), 0.2)] {
             for (world, reverse) in [
                 (DMat4::IDENTITY, false),
                 (turn, true),
@@ -190,16 +195,20 @@ fn points_have_the_formulas_of_pbrt() {
                 let swaps = world.determinant() < 0.0;
                 let (shapes, bvh) = of_world(shape(curves.clone(), reverse, swaps));
                 for number in 0..2000 {
-                    let ray = ray_at(&curves, &stream(number));
+                    let ray = ray_at(&curves, &stream(number), 1.3);
                     let Some(hit) = bvh.intersect(&ray) else {
                         continue;
                     };
+                    // Joints are round: v counts from the joint.
+                    if hit.u == 0.0 || hit.u == 1.0 {
+                        continue;
+                    }
                     let (surface, patch) = at(&shapes, &ray, &hit);
                     let u = f64::from(patch.place.uv.x);
                     let expected = reference(&curves, &world, &ray, u, reverse);
                     let axis = Axis::new(&curves.control(0), u as f32);
                     // Along the curve, across is nowhere.
-                    if axis.tangent.normalize().dot(surface.wo).abs() > 0.95 {
+                    if axis.tangent.normalize().dot(surface.wo).abs() > 0.8 {
                         continue;
                     }
                     let what = format!("{profile:?} {number} {reverse} {swaps} {tolerance}");
@@ -211,8 +220,8 @@ fn points_have_the_formulas_of_pbrt() {
                     );
                     let off = (surface.point.as_dvec3() - expected.point).length();
                     // A curve is a tenth of its largest radius away from its segments, which are seen at a slant.
-                    let bound = 0.4 * f64::from(curves.points[0][3]);
-                    assert!(off < bound + 1e-3, "{what}: {off}");
+                    let bound = 4.0 * tolerance * f64::from(curves.points[0][3]);
+                    assert!(off < bound, "{what}: {off}");
                     near(surface.normal, expected.normal, 4.0 * tolerance, &what);
                     near(patch.tangents[0], expected.tangents[0], 1e-4, &what);
                     near(
@@ -238,7 +247,7 @@ fn outlines_are_a_radius_away() {
     let (_, bvh) = of_world(shape(curves.clone(), false, false));
     let (mut inside, mut outside) = (0, 0);
     for number in 0..4000 {
-        let ray = ray_at(&curves, &stream(number));
+        let ray = ray_at(&curves, &stream(number), 2.5);
         // Nearest point as the ray sees it, away from the ends.
         let nearest = (1..2000)
             .map(|i| {
@@ -278,7 +287,7 @@ fn rays_leave_curves() {
             let (mut again, mut count) = (0, 0);
             for number in 0..30_000 {
                 let stream = stream(number);
-                let ray = ray_at(&curves, &stream);
+                let ray = ray_at(&curves, &stream, 1.3);
                 let Some(hit) = bvh.intersect(&ray) else {
                     continue;
                 };
@@ -323,7 +332,7 @@ fn instances_show_curves_transformed() {
         let (flat, of_flat) = of_world(moved);
         let mut count = 0;
         for number in 0..2000 {
-            let ray = ray_at(&of_moved, &stream(number));
+            let ray = ray_at(&of_moved, &stream(number), 1.3);
             let (Some(hit), Some(other)) = (bvh.intersect(&ray), of_flat.intersect(&ray)) else {
                 continue;
             };
