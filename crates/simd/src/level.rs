@@ -166,7 +166,11 @@ pub trait Simd: Copy + Send + Sync + 'static + Width<4> + Width<8> + Width<16> {
                 column[lane] = value;
             }
         }
-        columns.map(|column| <Self as Width<8>>::Lanes::load(self, &column))
+        let mut lanes = [<Self as Width<8>>::Lanes::splat(self, 0.0); 8];
+        for (lanes, column) in lanes.iter_mut().zip(&columns) {
+            *lanes = <Self as Width<8>>::Lanes::load(self, column);
+        }
+        lanes
     }
 
     /// Prefetches every cache line of a value. Does nothing on CPUs without a prefetch instruction.

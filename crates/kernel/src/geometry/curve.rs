@@ -34,8 +34,9 @@ use crate::ray::{Hit, Ray};
 /// the last end of a chain are cut off flat.
 ///
 /// `u` of a hit is `s`. `v` goes from 0 at one side over 1/2 on the axis to 1 at the other side, which is on the left of
-/// the axis for someone who looks along the ray with up along the axis. At a joint it counts across the axis too. [`Bvh::normal`](crate::Bvh::normal) is
-/// perpendicular to the axis and faces the ray. A ray may hit several segments of a curve.
+/// the axis for someone who looks along the ray with up along the axis. At a joint `v` counts across the axis of the
+/// segment as well, and `u` is 0 or 1. [`Bvh::normal`](crate::Bvh::normal) is perpendicular to the axis and faces the ray. A
+/// ray may hit several segments of a curve.
 ///
 /// [`Bvh::closest`](crate::Bvh::closest) and its relatives find the nearest point of the axis. Curves have no inside.
 ///

@@ -51,13 +51,14 @@ pub(crate) fn between<const K: usize>(start: &[f32; K], end: &[f32; K], share: f
 
 /// The transforms between two keys, made ready for rays.
 ///
-/// With `t` from -1/2 to 1/2, the rotation by `2 w t` about the axis `n` of the rotation between the keys, after the rotation `R` in the
-/// middle, is `n nᵀ R + cos(2 w t) (R - n nᵀ R) + sin(2 w t) [n]× R` (Rodrigues). The stretch is `S + t D`. So their product with the
-/// translation is `A(t) + cos(2 w t) B(t) + sin(2 w t) C(t)`, each linear in `t`.
+/// Let `w` be the angle between the keys, `n` the axis, `R` the rotation in the middle, and `t` go from -1/2 to 1/2. Then the
+/// rotation is `n nᵀ R + cos(w t) (R - n nᵀ R) + sin(w t) [n]× R` (Rodrigues). The stretch is `S + t D`. So their product with
+/// the translation is `A + cos(w t) B + sin(w t) C`, where `A`, `B` and `C` are linear in `t`. Sine and cosine come from those
+/// of the half angle, whose series are short.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Interpolation {
-    /// Coefficients of the series of `cos(w t)` and `sin(w t) / t` in `t²`.
+    /// Coefficients of the series of `cos(w t / 2)` and `sin(w t / 2) / t` in `t²`.
     series: [[f64; 2]; TERMS],
     /// `A`, `B` and `C` in the middle, and their change from key to key. Rows of three numbers and the translation.
     parts: [[[[f64; 4]; 3]; 2]; 3],
@@ -113,8 +114,8 @@ pub(crate) struct Path {
     moved: [[f64; 3]; 2],
     /// Stretches of both keys.
     stretched: [[[f64; 3]; 3]; 2],
-    /// `w`: half the angle that the object turns by, at most a quarter of a turn.
-    angle: f64,
+    /// Half the angle that the object turns by, at most a quarter of a turn.
+    half_angle: f64,
 }
 
 /// Why a transform cannot be a key.
@@ -140,8 +141,8 @@ impl Path {
         // The rotation from the first key to the second: the cosine of half its angle, and its axis times the sine.
         let [cosine, across @ ..] = quotient(end.turned, start.turned);
         let sine = math::sqrt(dot(across, across));
-        let angle = libm::atan2(sine, cosine);
-        let axis = across.map(|x| if angle < NO_ANGLE { 0.0 } else { x / sine });
+        let half_angle = libm::atan2(sine, cosine);
+        let axis = across.map(|x| if half_angle < NO_ANGLE { 0.0 } else { x / sine });
         let middle = matrix(array::from_fn(|i| start.turned[i] + end.turned[i]));
         let columns = [0, 1, 2].map(|column| middle.map(|row| row[column]));
         // `n nᵀ R`, what is left of `R`, and `[n]× R`.
@@ -160,12 +161,12 @@ impl Path {
             parts[0][0][axis][3] = 0.5 * (first + last);
             parts[0][1][axis][3] = last - first;
         }
-        let series = series(angle);
+        let series = series(half_angle);
         Ok(Self {
             interpolation: Interpolation { series, parts },
             moved: [start.moved, end.moved],
             stretched: [from, to],
-            angle,
+            half_angle,
         })
     }
 
@@ -191,7 +192,7 @@ impl Path {
         let distances = corners.iter().map(|corner| length(&[*corner]));
         let products = f64::max(length(&from), length(&to)) * distances.fold(0.0, f64::max);
         let radius = f64::max(largest(&from), largest(&to));
-        let speed = 2.0 * self.angle * radius + largest(&change);
+        let speed = 2.0 * self.half_angle * radius + largest(&change);
         let step = 1.0 / STEPS as f64;
         let mut steps = [[[0.0; 3]; 2]; STEPS];
         for (index, planes) in steps.iter_mut().enumerate() {
@@ -347,15 +348,16 @@ impl Parts {
     }
 }
 
-/// Coefficients of the series of `cos(w t)` and `sin(w t) / t` in `t²`. Below an eighth of a turn (`w |t|`) they are right to `2e-15`.
-fn series(w: f64) -> [[f64; 2]; TERMS] {
-    let mut series = [[1.0, w]; TERMS];
+/// Coefficients of the series of `cos(a t)` and `sin(a t) / t` in `t²`. They are right to `2e-15` where `a |t|` is below an eighth of
+/// a turn.
+fn series(a: f64) -> [[f64; 2]; TERMS] {
+    let mut series = [[1.0, a]; TERMS];
     for term in 1..TERMS {
         let n = 2.0 * term as f64;
         let [cos, sin] = series[term - 1];
         series[term] = [
-            -cos * w * w / ((n - 1.0) * n),
-            -sin * w * w / (n * (n + 1.0)),
+            -cos * a * a / ((n - 1.0) * n),
+            -sin * a * a / (n * (n + 1.0)),
         ];
     }
     series

@@ -58,6 +58,15 @@ pub(super) fn sweep(lookup: &mut Lookup, report: &mut Report) -> Option<f64> {
     Some(f64::from(degrees).to_radians())
 }
 
+/// Heights of both ends, the lower one first. The default of the upper one is 1.
+pub(super) fn heights(lookup: &mut Lookup, low: f32, report: &mut Report) -> [f64; 2] {
+    let ends = [
+        lookup.float("zmin", low, report),
+        lookup.float("zmax", 1.0, report),
+    ];
+    [ends[0].min(ends[1]), ends[0].max(ends[1])].map(f64::from)
+}
+
 pub(super) fn report_empty(lookup: &Lookup, report: &mut Report) {
     let message = format!("{} has no surface", lookup.what());
     report.error(lookup.at, message);
@@ -104,11 +113,7 @@ pub(super) fn cylinder(
     report: &mut Report,
 ) -> Option<TriangleMesh> {
     let radius = radius(lookup, report);
-    let ends = [
-        lookup.float("zmin", -1.0, report),
-        lookup.float("zmax", 1.0, report),
-    ];
-    let [low, high] = [ends[0].min(ends[1]), ends[0].max(ends[1])].map(f64::from);
+    let [low, high] = heights(lookup, -1.0, report);
     let sweep = sweep(lookup, report)?;
     if low == high {
         report_empty(lookup, report);

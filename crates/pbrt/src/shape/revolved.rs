@@ -6,7 +6,7 @@ use antumbra_scene::TriangleMesh;
 use glam::{DMat3, DVec3};
 
 use super::grid;
-use super::quadric::{POSITIVE, Tessellation, radius, report_empty, sweep};
+use super::quadric::{POSITIVE, Tessellation, heights, radius, report_empty, sweep};
 use crate::lookup::Lookup;
 use crate::report::Report;
 
@@ -82,11 +82,7 @@ pub(super) fn paraboloid(
     report: &mut Report,
 ) -> Option<TriangleMesh> {
     let radius = radius(lookup, report);
-    let ends = [
-        lookup.float("zmin", 0.0, report),
-        lookup.float("zmax", 1.0, report),
-    ];
-    let [low, high] = [ends[0].min(ends[1]), ends[0].max(ends[1])].map(f64::from);
+    let [low, high] = heights(lookup, 0.0, report);
     let sweep = sweep(lookup, report)?;
     if low == high || high == 0.0 {
         report_empty(lookup, report);

@@ -7,8 +7,8 @@ use alloc::vec::Vec;
 
 use antumbra_simd::{Dispatch, Isa};
 
+use super::found;
 use crate::builder::Builder;
-use crate::geometry::QueryKind;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::ray_setup::RaySetup;
 use crate::parallel;
@@ -95,17 +95,9 @@ impl Witness for Evidence {
     fn node(&mut self, _node: u32) {}
 
     fn hits(&mut self, ray: &RaySetup, hits: LeafHits<'_>) {
-        let (primitives, prims) = (hits.primitives, hits.prims);
-        for lane in hits {
-            let prim = prims[lane];
-            let index = prim as usize;
-            if primitives.instance(index).is_some() {
-                continue;
-            }
-            if primitives.hit(index, ray, QueryKind::Occluded).is_some() {
-                self.hits.push((self.rays.len() as u32 - 1, prim));
-            }
-        }
+        let of_ray = self.rays.len() as u32 - 1;
+        self.hits
+            .extend(found(hits, ray).map(|(prim, _)| (of_ray, prim)));
     }
 
     fn end(&mut self) {}

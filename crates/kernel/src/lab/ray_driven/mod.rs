@@ -16,13 +16,16 @@ pub(crate) mod vdbvh;
 
 use crate::aabb::Aabb;
 use crate::builder::binned_sah;
-use crate::geometry::BLOCK;
 use crate::geometry::primitives::Primitives;
+use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::slab_test::hits_box;
+use crate::geometry::{BLOCK, QueryKind};
 use crate::lab::candidates::Candidates;
 use crate::lab::pieces::Piece;
 use crate::lab::ray_driven::evidence::Evidence;
 use crate::parallel;
+use crate::ray::Hit;
+use crate::trace::binary::LeafHits;
 use crate::tree::binary::BinaryTree;
 
 /// Nodes that fewer rays enter are split by areas.
@@ -33,6 +36,21 @@ const MAX_DEPTH: u32 = 56;
 
 /// Nodes of fewer primitives and rays than this are the work of one thread.
 const SEQUENTIAL: usize = 1024;
+
+/// Primitives of a leaf that a ray hits, with their hits. Instances are left out.
+fn found(hits: LeafHits<'_>, ray: &RaySetup) -> impl Iterator<Item = (u32, Hit)> {
+    let (primitives, prims) = (hits.primitives, hits.prims);
+    hits.filter_map(move |lane| {
+        let prim = prims[lane];
+        match primitives.instance(prim as usize) {
+            Some(_) => None,
+            None => {
+                let hit = primitives.hit(prim as usize, ray, QueryKind::Occluded)?;
+                Some((prim, hit))
+            }
+        }
+    })
+}
 
 /// Measures of a node, or of one side of a split.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -8,8 +8,8 @@ use alloc::vec::Vec;
 
 use antumbra_simd::{Dispatch, Isa};
 
+use super::found;
 use crate::builder::Builder;
-use crate::geometry::QueryKind;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::ray_setup::RaySetup;
 use crate::hash::Random;
@@ -141,18 +141,10 @@ impl Witness for Nearest {
     fn node(&mut self, _: u32) {}
 
     fn hits(&mut self, ray: &RaySetup, hits: LeafHits<'_>) {
-        let (primitives, prims) = (hits.primitives, hits.prims);
-        for lane in hits {
-            let prim = prims[lane];
-            let index = prim as usize;
-            if primitives.instance(index).is_some() {
-                continue;
-            }
-            if let Some(hit) = primitives.hit(index, ray, QueryKind::Occluded) {
-                // Of equal distances the smaller index, whatever the tree.
-                if self.found.is_none_or(|found| (hit.t, prim) < found) {
-                    self.found = Some((hit.t, prim));
-                }
+        for (prim, hit) in found(hits, ray) {
+            // Of equal distances the smaller index, whatever the tree.
+            if self.found.is_none_or(|found| (hit.t, prim) < found) {
+                self.found = Some((hit.t, prim));
             }
         }
     }

@@ -2,8 +2,8 @@
 //! Burley 2016, *A Practical and Controllable Hair and Fur Model for Production Path Tracing*, as in pbrt-v3).
 //!
 //! The x axis of the frame points along the hair. Light is reflected (path 0), passes through (1), is reflected inside once
-//! (2), or more often (the last). The offset across the hair is the texture coordinate v, as in pbrt-v3. The normal matters
-//! not: angles around the hair are measured from the viewer.
+//! (2), or more often (the last). The offset across the hair is the texture coordinate v, as in pbrt-v3. The normal does
+//! not matter: angles around the hair are measured from the viewer.
 
 use std::f32::consts::{PI, TAU};
 
