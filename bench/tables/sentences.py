@@ -305,9 +305,8 @@ SOURCES = {
         ("at least 200 000 triangles", "bench/calls/src/motion.rs", "builtin:city:200000"),
         ("each instance 5120", "bench/calls/src/motion.rs", "icosphere(4)"),
     ],
-    "docs/src/gallery/standard.md": [
-        ("CC BY 3.0", "cited"),
-        ("CC BY-SA 4.0", "cited"),
+    "docs/src/gallery/standard.md": [("CC BY 3.0", "cited"), ("CC BY-SA 4.0", "cited")],
+    "docs/src/beside-pbrt3.md": [
         ("and Antumbra 1.25", "crates/render/src/surface/curve.rs", "CLEARANCE: f32 = 1.25"),
     ],
     "README.md": [("1.89", "Cargo.toml", 'rust-version = "1.89"'), ("JCGT 5(2), 2016", "cited"), ("Version 0.1", "Cargo.toml", 'version = "0.1.0"')],

@@ -249,7 +249,9 @@ fn curves_that_are_alike_are_one_shape() {
     let hair = |x: u32| format!("Shape \"curve\" \"point P\" [{x} 0 0 {x} 0 1 {x} 0 2 {x} 0 3] ");
     let [a, b, c] = [0, 1, 2].map(hair);
     let text = format!(
-        "WorldBegin {a}{b} Material \"mirror\" {c} ReverseOrientation {a}{b}{c} ObjectBegin \"o\" {a}{b} ObjectEnd {c} WorldEnd"
+        "Integrator \"volpath\" WorldBegin {a}{b} Material \"mirror\" {c} ReverseOrientation {a}{b}{c} \
+         ObjectBegin \"o\" {a}{b} ObjectEnd {c} \
+         MakeNamedMedium \"m\" \"string type\" \"homogeneous\" MediumInterface \"m\" \"\" {a} WorldEnd"
     );
     let scene = load_text(&text).unwrap().scene;
     let counts: Vec<_> = scene
@@ -260,7 +262,7 @@ fn curves_that_are_alike_are_one_shape() {
             _ => 0,
         })
         .collect();
-    assert_eq!(counts, [2, 1, 4]);
+    assert_eq!(counts, [2, 1, 4, 1]);
     let Geometry::Curves(last) = &scene.shapes[2].geometry else {
         panic!("curves")
     };

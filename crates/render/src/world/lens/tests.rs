@@ -123,15 +123,16 @@ fn weights_add_up_to_the_area_of_the_pupil() {
     // The rear element is the stop.
     let mut system = system(4.0);
     system.elements[0].diameter = 20.0;
-    let mean = |lens: &Lens| {
+    let mean_at = |lens: &Lens, place: [f64; 2]| {
         let sampler = Sampler::new(Method::OwenSobol, 1);
         let count = 1 << 14;
         let rays = (0..count).filter_map(|index| {
             let pupil = sampler.stream(0, 0, index).pair(0);
-            lens.leaving([0.5; 2], pupil)
+            lens.leaving(place, pupil)
         });
         rays.map(|ray| f64::from(ray.weight)).sum::<f64>() / f64::from(count)
     };
+    let mean = |lens: &Lens| mean_at(lens, [0.5; 2]);
     let simple = Lens::new(&system, &film()).unwrap();
     let [low, high] = simple.pupils[0];
     // The opening is 2 mm around the axis. Light on the edge is bent little before it reaches the rear element.
@@ -144,6 +145,10 @@ fn weights_add_up_to_the_area_of_the_pupil() {
         "{} {share}",
         mean(&simple)
     );
+    // From the corner the opening is as large, and further away at a slant.
+    let cos2 = simple.rear_z().powi(2) / (simple.rear_z().powi(2) + simple.reach.powi(2));
+    let darker = mean_at(&simple, [0.0; 2]) / mean(&simple);
+    assert!((darker / cos2.powi(2) - 1.0).abs() < 0.02, "{darker}");
     system.exposure = Some(3.0);
     let timed = Lens::new(&system, &film()).unwrap();
     let expected = 3.0 * circle / timed.rear_z().powi(2);
