@@ -308,6 +308,7 @@ SOURCES = {
     "docs/src/gallery/standard.md": [("CC BY 3.0", "cited"), ("CC BY-SA 4.0", "cited")],
     "docs/src/beside-pbrt3.md": [
         ("and Antumbra 1.25", "crates/render/src/surface/curve.rs", "CLEARANCE: f32 = 1.25"),
+        ("With six radii the difference is -0.08 %", "bench/record/zen3-2026-11-26-pbrt3.txt", "difference -0.075 %"),
     ],
     "README.md": [("1.89", "Cargo.toml", 'rust-version = "1.89"'), ("JCGT 5(2), 2016", "cited"), ("Version 0.1", "Cargo.toml", 'version = "0.1.0"')],
     RESULTS: [

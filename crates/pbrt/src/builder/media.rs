@@ -1,6 +1,6 @@
 //! Media by name, and those on the two sides of shapes.
 
-use antumbra_scene::{Integrator, Medium, MediumInterface};
+use antumbra_scene::{Integrator, Light, Medium, MediumInterface, Shape};
 
 use super::Builder;
 use crate::directive::Quoted;
@@ -64,13 +64,45 @@ impl Builder<'_> {
         found
     }
 
-    /// Says where the integrator does not know media. They are left out then, as in pbrt-v3.
+    /// Says where the integrator does not know media, which are left out then, as in pbrt-v3, and where a medium without
+    /// an end keeps light out.
     pub(super) fn check_media(&self, end: Span, report: &mut Report) {
-        let mut shapes = self.all_shapes();
-        let has_media = self.camera.medium.is_some() || shapes.any(|shape| shape.media.is_some());
-        if has_media && !matches!(self.integrator, Integrator::VolumePath { .. }) {
+        let is_used = |shape: &Shape| shape.media.is_some();
+        let has_media = self.camera.medium.is_some() || self.all_shapes().any(is_used);
+        if !has_media {
+            return;
+        }
+        if !matches!(self.integrator, Integrator::VolumePath { .. }) {
             let message = "participating media are left out: only volpath, bdpt and mlt know them";
             report.note(end, message);
+        } else if self.is_in_endless_medium() {
+            let is_far =
+                |light: &&Light| matches!(light, Light::Distant { .. } | Light::Infinite { .. });
+            let count = self.lights.iter().filter(is_far).count();
+            if count > 0 {
+                let message = format!(
+                    "the medium around the camera has no end, so light from infinity ({count} of the lights) is lost in it; \
+                     pbrt-v3 ends it where the scene ends: put a closed shape with this medium inside around the scene"
+                );
+                report.note(end, message);
+            }
         }
+    }
+
+    /// Whether all that is far away from the camera is one medium that absorbs or scatters.
+    fn is_in_endless_medium(&self) -> bool {
+        let Some(index) = self.camera.medium else {
+            return false;
+        };
+        let Some(medium) = self.media.get(index as usize) else {
+            return false;
+        };
+        let has_end = |shape: &Shape| {
+            (shape.media).is_some_and(|media| media.inside.is_none() || media.outside.is_none())
+        };
+        let extinction = medium.absorption + medium.scattering;
+        medium.density.is_none()
+            && extinction.max_element() > 0.0
+            && !self.all_shapes().any(has_end)
     }
 }

@@ -87,3 +87,32 @@ fn media_that_play_no_part_are_noted() {
     );
     assert_eq!(scene.shapes[1].media, None);
 }
+
+/// Fog around the camera, with a light at infinity: dark unless a shape ends the fog, or it is thin as on a grid.
+#[test]
+fn endless_media_are_noted_if_they_keep_light_out() {
+    let lost = |medium: &str, shape: &str, lights: &str| {
+        let text = format!(
+            r#"Integrator "volpath" MakeNamedMedium "fog" {medium} MediumInterface "" "fog"
+            Camera "perspective" WorldBegin {shape} {lights} WorldEnd"#
+        );
+        let (scene, notes) = tolerated(&text);
+        assert_eq!(scene.camera.medium, Some(0), "{text}");
+        let note = notes
+            .iter()
+            .find(|note| note.message.contains("has no end"));
+        note.map(|note| note.message.clone())
+    };
+    let fog = r#""string type" "homogeneous""#;
+    let wall = r#"AttributeBegin MediumInterface "" "" Shape "sphere" AttributeEnd"#;
+    let sky = r#"LightSource "infinite" LightSource "point" LightSource "distant""#;
+    let note = lost(fog, wall, sky).expect("a note");
+    assert!(note.contains("2 of the lights"), "{note}");
+    assert_eq!(lost(fog, wall, r#"LightSource "point""#), None);
+    let end = r#"AttributeBegin MediumInterface "fog" "" Shape "sphere" AttributeEnd"#;
+    assert_eq!(lost(fog, end, sky), None);
+    let clear = r#""string type" "homogeneous" "rgb sigma_a" [0 0 0] "rgb sigma_s" [0 0 0]"#;
+    assert_eq!(lost(clear, wall, sky), None);
+    let grid = r#""string type" "heterogeneous" "float density" [1] "integer nx" 1 "integer ny" 1 "integer nz" 1"#;
+    assert_eq!(lost(grid, wall, sky), None);
+}
