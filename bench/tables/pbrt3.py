@@ -4,7 +4,7 @@ import pathlib
 
 from tables.texts import lines
 
-TIMES, PICTURES = "zen3-2026-11-26-pbrt3-times.txt", "zen3-2026-11-26-pbrt3.txt"
+TIMES, PICTURES = "xeon-2026-11-26-pbrt3-times.txt", "zen3-2026-11-26-pbrt3.txt"
 SCENES = pathlib.Path(__file__).resolve().parent.parent / "pbrt3-scenes"
 
 

@@ -305,7 +305,11 @@ SOURCES = {
         ("at least 200 000 triangles", "bench/calls/src/motion.rs", "builtin:city:200000"),
         ("each instance 5120", "bench/calls/src/motion.rs", "icosphere(4)"),
     ],
-    "docs/src/gallery/standard.md": [("CC BY 3.0", "cited"), ("CC BY-SA 4.0", "cited")],
+    "docs/src/gallery/standard.md": [
+        ("CC BY 3.0", "cited"),
+        ("CC BY-SA 4.0", "cited"),
+        ("pbrt-v3's within 1 %", "bench/record/xeon-2026-11-26-pbrt3-times.txt", "| -1.0 | -0.91"),
+    ],
     "docs/src/beside-pbrt3.md": [
         ("and Antumbra 1.25", "crates/render/src/surface/curve.rs", "CLEARANCE: f32 = 1.25"),
         ("With six radii the difference is -0.08 %", "bench/record/zen3-2026-11-26-pbrt3.txt", "difference -0.075 %"),

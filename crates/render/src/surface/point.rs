@@ -187,8 +187,8 @@ impl Surface {
 
     /// Direction in which the texture coordinate u grows, for materials that brush along it.
     ///
-    /// Meshes without usable texture coordinates have pbrt's default ones, (0,0) (1,0) (1,1). On spheres, which
-    /// keep no rotation of their own, u turns around the z axis of the world or of the object.
+    /// Meshes without usable texture coordinates have pbrt's default ones, (0,0) (1,0) (1,1). On spheres u turns around
+    /// their own z axis.
     pub fn tangent(&self, shapes: &Shapes) -> Vec3 {
         let placement = shapes.placement_of(self.inst_id);
         let placement = placement.as_deref();
@@ -207,11 +207,12 @@ impl Surface {
                 }
                 tangent
             }
-            Geometry::Sphere(_) => {
+            Geometry::Sphere(sphere) => {
                 let normal = placement.map_or(self.normal, |placement| {
                     placement.object_normal(self.normal)
                 });
-                Vec3::new(-normal.y, normal.x, 0.0)
+                let own = sphere.axes.transpose() * normal;
+                sphere.axes * Vec3::new(-own.y, own.x, 0.0)
             }
             Geometry::Curves(curves) => {
                 let point = placement.map_or(self.point, |to| to.object_point(self.point));
@@ -399,5 +400,26 @@ mod tests {
                 .to_vec();
         }
         assert_eq!(surface.tangent(&world(&shape)), Vec3::Y);
+    }
+
+    /// At the top of a ball that is turned so that its poles are on the y axis.
+    #[test]
+    fn tangents_turn_with_spheres() {
+        let mut shape = shape(Vec::new(), false, false);
+        let ball = antumbra_scene::Sphere::new(Vec3::new(0.25, 0.25, -1.0), 1.0);
+        for (quarters, along) in [(0, Vec3::ZERO), (1, -Vec3::X), (3, Vec3::X)] {
+            let turn =
+                glam::DMat4::from_rotation_x(std::f64::consts::FRAC_PI_2 * f64::from(quarters));
+            let turned = ball.transformed(&turn).expect("a ball");
+            let (center, radius) = (ball.center, ball.radius);
+            shape.geometry = Geometry::Sphere(antumbra_scene::Sphere {
+                center,
+                radius,
+                ..turned
+            });
+            let shapes = world(&shape);
+            let tangent = hit(&shapes).tangent(&shapes);
+            assert!((tangent - along).length() < 1e-6, "{quarters}: {tangent}");
+        }
     }
 }
