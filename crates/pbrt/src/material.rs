@@ -42,6 +42,7 @@ const OVERRIDABLE: &[&str] = &[
     "amount",
     "bumpmap",
     "eta",
+    "g",
     "index",
     "k",
     "mfp",
@@ -51,6 +52,7 @@ const OVERRIDABLE: &[&str] = &[
     "reflect",
     "remaproughness",
     "roughness",
+    "scale",
     "sigma",
     "sigma_a",
     "sigma_s",
@@ -141,7 +143,8 @@ pub(crate) fn of_shape<'a>(
     state: &State,
     report: &mut Report,
 ) -> Material {
-    let overrides = (OVERRIDABLE.iter().chain(disney::PARAMETERS)).any(|name| lookup.has(name));
+    let names = OVERRIDABLE.iter().chain(disney::PARAMETERS);
+    let overrides = (names.chain(hair::PARAMETERS)).any(|name| lookup.has(name));
     match current {
         Some(spec) if !overrides => spec.material.clone(),
         None if !overrides => DEFAULT,
@@ -320,14 +323,42 @@ fn fourier(values: &mut Textured) -> Option<Material> {
 fn index_of_refraction(values: &mut Textured) -> Param<f32> {
     let index = values.find::<f32>("index");
     let eta = values.find("eta").or(index);
-    match eta {
-        Some((Param::Constant(value), span)) if value <= 0.0 => {
+    positive_index(values, eta, 1.5)
+}
+
+/// An index of refraction that was found, which is positive as far as it is constant.
+fn positive_index(
+    values: &mut Textured,
+    found: Option<(Param<f32>, Span)>,
+    default: f32,
+) -> Param<f32> {
+    match found {
+        Some((Param::Constant(value), span)) if !(value > 0.0) => {
             let message = format!("the index of refraction must be positive, found {value}");
             values.report.error(span, message);
-            1.5.into()
+            default.into()
         }
         Some((eta, _)) => eta,
-        None => 1.5.into(),
+        None => default.into(),
+    }
+}
+
+/// Number in 0..=1, or the nearest of these, with a note.
+fn share(values: &mut Textured, name: &'static str, default: f32) -> Param<f32> {
+    limited(values, name, default, 1.0)
+}
+
+/// Number in 0..=`most`, or the nearest of these, with a note.
+fn limited(values: &mut Textured, name: &'static str, default: f32, most: f32) -> Param<f32> {
+    match values.find::<f32>(name) {
+        Some((Param::Constant(value), span)) if !(0.0..=most).contains(&value) => {
+            let nearest = value.clamp(0.0, most);
+            let message = format!("{name:?} is taken as {nearest}, found {value}");
+            values.report.note(span, message);
+            nearest.into()
+        }
+        Some((value, _)) => value,
+        None => default.into(),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use antumbra_scene::{Disney, DisneyBody, Material, Param, Rgb};
 
-use super::roughness;
+use super::{limited, positive_index, roughness, share};
 use crate::texture::Textured;
 
 /// Parameters that no other material has, which a shape may override.
@@ -25,11 +25,12 @@ pub(super) const PARAMETERS: &[&str] = &[
 /// Reads a `disney`.
 pub(super) fn disney(values: &mut Textured) -> Material {
     let specular_transmission = share(values, "spectrans", 0.0);
+    let eta = values.find("eta");
     let body = body(values, &specular_transmission);
     Material::Disney(Box::new(Disney {
         color: values.param("color", 0.5),
         metallic: share(values, "metallic", 0.0),
-        eta: eta(values),
+        eta: positive_index(values, eta, 1.5),
         roughness: roughness(values, "roughness", 0.5),
         specular_tint: share(values, "speculartint", 0.0),
         anisotropic: share(values, "anisotropic", 0.0),
@@ -79,34 +80,4 @@ fn body(values: &mut Textured, clear: &Param<f32>) -> DisneyBody {
         };
     }
     DisneyBody::Solid { scatter_distance }
-}
-
-fn eta(values: &mut Textured) -> Param<f32> {
-    match values.find::<f32>("eta") {
-        Some((Param::Constant(value), span)) if !(value > 0.0) => {
-            let message = format!("the index of refraction must be positive, found {value}");
-            values.report.error(span, message);
-            1.5.into()
-        }
-        Some((eta, _)) => eta,
-        None => 1.5.into(),
-    }
-}
-
-/// Number in 0..=1, or the nearest of these, with a note.
-fn share(values: &mut Textured, name: &'static str, default: f32) -> Param<f32> {
-    limited(values, name, default, 1.0)
-}
-
-fn limited(values: &mut Textured, name: &'static str, default: f32, most: f32) -> Param<f32> {
-    match values.find::<f32>(name) {
-        Some((Param::Constant(value), span)) if !(0.0..=most).contains(&value) => {
-            let nearest = value.clamp(0.0, most);
-            let message = format!("{name:?} is taken as {nearest}, found {value}");
-            values.report.note(span, message);
-            nearest.into()
-        }
-        Some((value, _)) => value,
-        None => default.into(),
-    }
 }

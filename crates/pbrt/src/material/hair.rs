@@ -2,7 +2,11 @@
 
 use antumbra_scene::{Material, Pigment, Rgb};
 
+use super::{positive_index, share};
 use crate::texture::Textured;
+
+/// Parameters that no other material has, which a shape may override. Not "alpha", which masks shapes.
+pub(super) const PARAMETERS: &[&str] = &["beta_m", "beta_n", "eumelanin", "pheomelanin"];
 
 /// Concentration of eumelanin without parameters: brown hair.
 const BROWN: f32 = 1.3;
@@ -32,10 +36,11 @@ pub(super) fn hair(values: &mut Textured) -> Material {
         }
         (None, None) => Pigment::Melanin([BROWN.into(), 0.0.into()]),
     };
+    let eta = values.find("eta");
     Material::Hair {
         pigment,
-        eta: values.param("eta", 1.55),
-        roughness: ["beta_m", "beta_n"].map(|name| values.param(name, 0.3)),
+        eta: positive_index(values, eta, 1.55),
+        roughness: ["beta_m", "beta_n"].map(|name| share(values, name, 0.3)),
         tilt: values.param("alpha", 2.0),
     }
 }

@@ -52,6 +52,10 @@ pub(super) fn curve(lookup: &mut Lookup, middle: DVec3, report: &mut Report) -> 
         report.error(lookup.at, format!("{} has no width", lookup.what()));
         return None;
     }
+    if (normals.iter().flatten()).any(|normal| *normal == DVec3::ZERO) {
+        report.error(lookup.at, "a normal \"N\" is zero, so it has no direction");
+        return None;
+    }
     for point in segments.iter_mut().flatten() {
         *point -= middle;
     }

@@ -172,6 +172,24 @@ fn control_points(lookup: &mut Lookup, wanted: usize, report: &mut Report) -> Op
             _ => return None,
         },
     };
+    let values: Vec<f64> = match &param.values {
+        Values::Points(values) => values.clone(),
+        Values::Floats(values) => values.iter().copied().map(f64::from).collect(),
+        _ => return None,
+    };
+    let is_weight = |index: usize| weighted.is_some() && index % 4 == 3;
+    let is_wrong =
+        |&index: &usize| !values[index].is_finite() || (is_weight(index) && values[index] < 0.0);
+    if let Some(index) = (0..values.len()).find(is_wrong) {
+        let (name, x) = (&param.name, values[index]);
+        let message = match is_weight(index) && x.is_finite() {
+            true => format!("a weight of {name:?} must not be negative, found {x}"),
+            false => format!("{name:?} must be finite, found {x}"),
+        };
+        let span = param.value_span(index, report);
+        report.error(span, message);
+        return None;
+    }
     if points.len() != wanted {
         let message = format!(
             "found {} control points, but nu x nv is {wanted}",

@@ -3,7 +3,7 @@
 use antumbra_pbrt::Severity;
 use antumbra_scene::{
     Accelerator, DirectStrategy, Filter, Geometry, Integrator, Light, LightStrategy, Material,
-    Projection, Rgb, SamplerKind, Shape, TriangleMesh,
+    Pigment, Projection, Rgb, SamplerKind, Shape, TriangleMesh,
 };
 use glam::{Mat4, Vec3};
 
@@ -408,6 +408,17 @@ fn shapes_override_parameters_of_their_material() {
         panic!()
     };
     assert_eq!(kd, &Rgb::splat(0.25).into());
+    let scene = world(
+        r#"Material "hair" "float beta_m" .2
+        Shape "curve" "point P" [0 0 0 1 0 0 2 0 0 3 0 0] "float eumelanin" 8 "float beta_n" 7"#,
+    );
+    let expected = Material::Hair {
+        pigment: Pigment::Melanin([8.0.into(), 0.0.into()]),
+        eta: 1.55.into(),
+        roughness: [0.2.into(), 1.0.into()],
+        tilt: 2.0.into(),
+    };
+    assert_eq!(scene.materials[scene.shapes[0].material], expected);
 }
 
 #[test]

@@ -144,6 +144,12 @@ WorldBegin WorldEnd"#, r#"16 numbers in [ ]"#),
         (r#"WorldBegin ›Shape "curve" WorldEnd"#, r#"needs a parameter "P""#),
         (r#"WorldBegin ›Shape "curve" "point P" [0 0 0 1 0 0 2 0 0] WorldEnd"#, r#"3 points "P" make no curve; a curve needs 4 and any number of times 3 more"#),
         (r#"WorldBegin ›Shape "curve" "string basis" "bspline" "integer degree" 2 "point P" [0 0 0 1 0 0] WorldEnd"#, r#"a curve needs at least 3"#),
+        (r#"WorldBegin Material "hair" "float eta" ›-1 WorldEnd"#, r#"must be positive, found -1"#),
+        (r#"WorldBegin Shape "nurbs" "integer nu" 2 "integer nv" 2 "integer uorder" 2 "integer vorder" 2
+"float uknots" [0 0 1 1] "float vknots" [0 0 1 1] "point P" [0 0 0  1 0 0  0 ›nan 0  1 1 0] WorldEnd"#, r#""P" must be finite, found NaN"#),
+        (r#"WorldBegin Shape "nurbs" "integer nu" 2 "integer nv" 2 "integer uorder" 2 "integer vorder" 2
+"float uknots" [0 0 1 1] "float vknots" [0 0 1 1] "float Pw" [0 0 0 1  1 0 0 ›-1  0 1 0 1  1 1 0 1] WorldEnd"#, r#"must not be negative, found -1"#),
+        (r#"WorldBegin ›Shape "curve" "string type" "ribbon" "point P" [0 0 0 1 0 0 2 0 0 3 0 0] "normal N" [0 0 1 0 0 0] WorldEnd"#, r#"has no direction"#),
         (r#"WorldBegin Shape "curve" "string basis" ›"nurbs" "point P" [0 0 0 1 0 0 2 0 0 3 0 0] WorldEnd"#, r#""basis" cannot be "nurbs""#),
         (r#"WorldBegin ›Shape "curve" "integer degree" 4 "point P" [0 0 0 1 0 0 2 0 0 3 0 0] WorldEnd"#, r#"degree 2 or 3, found 4"#),
         (r#"WorldBegin ›Shape "curve" "float width" 0 "point P" [0 0 0 1 0 0 2 0 0 3 0 0] WorldEnd"#, r#"has no width"#),

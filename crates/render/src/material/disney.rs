@@ -155,7 +155,9 @@ impl Disney {
 fn mean_free_path(color: Vec3, distance: Vec3) -> Vec3 {
     let paths = |color: f32| 1.9 - color + 3.5 * (color - 0.8) * (color - 0.8);
     let paths = Vec3::from(color.to_array().map(paths));
-    (distance * PROFILE_WIDTH * paths).max(SHORTEST)
+    let paths = distance * PROFILE_WIDTH * paths;
+    // Between paths that are even shorter beside the others, a walk would end by rounding.
+    paths.max(SHORTEST.max(Vec3::splat(1e-4 * paths.max_element())))
 }
 
 /// Surface above a body in which light walks, where pbrt-v3 has a profile of two exponentials.

@@ -581,7 +581,7 @@ impl Parameters {
                         absorption_of_melanin(melanin.each_ref().map(|value| value.at(place)))
                     }
                 };
-                let (eta, tilt) = (eta.at(place), tilt.at(place));
+                let (eta, tilt) = (eta.at(place).max(1e-3), tilt.at(place));
                 let offset = 2.0 * place.uv.y - 1.0;
                 let hair = Hair::new(eta, absorption, roughness, tilt, offset);
                 Bsdf::lobes(vec![Lobe::Hair(hair)])

@@ -1,6 +1,6 @@
 //! Refuses scenes that would panic or make no picture.
 
-use antumbra_scene::{DensityGrid, Film, Geometry, Integrator, Material, Rgb, Scene};
+use antumbra_scene::{DensityGrid, Film, Geometry, Integrator, Material, Medium, Rgb, Scene};
 
 use crate::Error;
 use crate::film::filter;
@@ -109,6 +109,13 @@ fn check_media(scene: &Scene) -> Result<(), Error> {
         } else if medium.density.as_ref().is_some_and(is_broken) {
             "the grid has another number of densities than of cells, a density that is negative or not finite, or a \
              transformation without inverse"
+        } else if medium
+            .density
+            .as_ref()
+            .is_some_and(|grid| optical_depth(medium, grid) > MAX_DEPTH)
+        {
+            "densities times coefficients along the diagonal of the grid are more than a million, so that walks through it \
+             do not end"
         } else {
             continue;
         };
@@ -122,6 +129,26 @@ fn check_media(scene: &Scene) -> Result<(), Error> {
         Some(index) => Err(Error::NoMedium { index, media }),
         None => Ok(()),
     }
+}
+
+/// Largest optical depth of a grid: so many steps a ray makes.
+const MAX_DEPTH: f32 = 1e6;
+
+/// Optical depth of a grid along its longest diagonal, if all of it were as dense as the densest cell.
+fn optical_depth(medium: &Medium, grid: &DensityGrid) -> f32 {
+    let densest = grid
+        .values
+        .iter()
+        .fold(0.0, |most: f32, &value| most.max(value));
+    let attenuation = (medium.absorption + medium.scattering).max_element();
+    let corners = [
+        [1.0, 1.0, 1.0],
+        [1.0, 1.0, -1.0],
+        [1.0, -1.0, 1.0],
+        [-1.0, 1.0, 1.0],
+    ];
+    let lengths = corners.map(|way| grid.world_from_grid.transform_vector3(way.into()).length());
+    attenuation * densest * lengths.into_iter().fold(0.0, f32::max)
 }
 
 /// Whether a grid cannot be used.

@@ -3,6 +3,7 @@
 use std::f64::consts::PI;
 
 use crate::support::*;
+use antumbra_render::{Error, World};
 use antumbra_scene::{
     DensityGrid, Integrator, Light, LightStrategy, Material, Medium, MediumInterface, Rgb, Scene,
 };
@@ -47,6 +48,22 @@ fn cube_of(medium: Medium, half: f32, max_depth: u32) -> Scene {
     scene.media.push(medium);
     add(&mut scene, cube(Vec3::Z * 5.0, half), Material::None).media = INSIDE;
     scene
+}
+
+/// A walk through a grid takes as many steps as its optical depth.
+#[test]
+fn grids_that_are_too_dense_are_refused() {
+    for (densest, fits) in [(1e4, true), (1e6, false), (f32::MAX, false)] {
+        let mut dense = medium(0.2, 0.2, 0.0);
+        let mut grid = ones(Vec3::Z * 5.0, 1.5);
+        let mut values = grid.values.to_vec();
+        values[0] = densest;
+        grid.values = values.into();
+        dense.density = Some(grid);
+        let world = World::new(&cube_of(dense, 1.5, 4));
+        let is_refused = matches!(world, Err(Error::Medium { index: 0, .. }));
+        assert_eq!(is_refused, !fits, "{densest}");
+    }
 }
 
 /// Beer and Lambert: an emitter behind a slab that absorbs, seen directly and by light samples.

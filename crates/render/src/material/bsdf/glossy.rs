@@ -103,7 +103,14 @@ pub struct GlossyTransmission {
 impl GlossyTransmission {
     /// Facets whose transmittance is `scale` times the transmittance of an interface. `eta` is the index of refraction
     /// below the normal over the index above it.
+    ///
+    /// An index of 1, where light goes straight on, has no facet for a pair of directions: the nearest is 0.1 % away.
     pub fn new(scale: Vec3, facets: TrowbridgeReitz, eta: f32) -> Self {
+        const LEAST: f32 = 1e-3;
+        let eta = match eta - 1.0 {
+            off if off.abs() < LEAST => 1.0 + LEAST.copysign(off),
+            _ => eta,
+        };
         Self { scale, facets, eta }
     }
 

@@ -557,6 +557,8 @@ fn white_furnace() {
         (metal(1.0, 1e4, [0.02, 0.02]), 0.01),
         (matte(1.0, 0.0), 1e-4),
         (translucent(1.0, 0.0, [0.3, 0.7], 0.1), 0.01),
+        // Light goes straight through.
+        (glass(1.0, 1.0, [0.1, 0.1], 1.0), 0.03),
     ] {
         let bsdf = bsdf(&material);
         for wo in views() {
