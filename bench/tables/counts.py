@@ -3,7 +3,7 @@
 from tables.paper import with_interval
 from tables.records import *
 
-COUNTS = "zen3-2026-11-26-counts.csv"
+COUNTS = "xeon-2026-11-26-counts.csv"
 # Scenes that were never used while designing: PUBLIC of bench/counts.
 NEVER_USED = (
     "staircase2 material-testball caustic-glass living-room staircase veach-ajar killeroo-gold breakfast wallpaper-bathroom bmw-m6"
@@ -56,7 +56,7 @@ def seeds_sentence():
     fewest, most = min(by_scene.values()), max(by_scene.values())
     count = f"{fewest} to {most} seeds each" if fewest < most else "one seed" if most == 1 else f"the median of {most} seeds"
     new = sum(scene in NEVER_USED for scene in rows.scenes)
-    return f"The record has {len(rows.scenes)} of twenty scenes so far, {new} of them never used, with {count}."
+    return f"The record has {len(rows.scenes)} scenes, {new} of them never used, with {count}."
 
 
 def outlier_sentence():
