@@ -49,6 +49,25 @@ def counts_by_scene():
     return by_scene(counted("orders-8"), "binned-sah", "area")
 
 
+def ray_driven():
+    """Gains in cost of builders that rays drive, in the order `joint`, over the surface area heuristic collapsed by area."""
+    lines = []
+    for rays, kind in (("shadow", "shadow"), ("ao", "ambient occlusion")):
+        rows = counted("ray-driven", rays)
+        tests = lambda scene, tree, collapse: cost(rows.known[scene, tree, collapse, "joint"])
+        for tree in ("binned-sah", "rdh", "srdh", "vdbvh"):
+            cells = []
+            for collapse in ("area", "learned"):
+                cells += with_interval([tests(s, "binned-sah", "area") / tests(s, tree, collapse) for s in rows.scenes])
+            lines.append([kind, f"`{tree}`", *cells])
+    return table(["rays", "builder", "`area`", "median", "`learned`", "median"], lines)
+
+
+def ray_driven_sentence():
+    """How many scenes these builders were counted on, as the page says it."""
+    return f"Counts of {len(counted('ray-driven').scenes)} of the twenty scenes, one seed:"
+
+
 def seeds_sentence():
     """How many scenes and seeds the record has, as the page says it."""
     rows = counted("orders-8")

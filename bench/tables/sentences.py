@@ -78,6 +78,7 @@ def counted(of):
     shares = [100 * of.number(r, "shadow_share") for r in paper[8].all]
     yield ORDER, f"In path tracing they are {two(shares, 0)} % of the rays of our scenes"
     yield RESULTS, of.seeds_sentence()
+    yield RESULTS, of.ray_driven_sentence()
     yield RESULTS, of.outlier_sentence()
     gaps = [of.Rows(of.record(of.LAB10), rays).gap("binned-sah", "area", "joint") for rays in ("shadow", "ao")]
     yield RESULTS, "On ten scenes `joint` closes {:.0f} % for shadow rays and {:.0f} % for ambient occlusion".format(*(100 * g for g in gaps))
@@ -387,6 +388,8 @@ SOURCES = {
     ],
     "docs/src/python/many-machines.md": [
         ("starts\n  about 0.3 CPU seconds", "bench/record/zen3-2026-11-26-python-machines.txt", "10.66"),
+        ("are 1.43 times as fast as one thread with tasks of 1.2 s", "bench/record/xeon-2026-11-26-python-machines.txt", "| 1.197 | 1.26 | 1.22 | 1.26 | 1.43 |"),
+        ("and 1.51 times with tasks of 3.6 s", "bench/record/xeon-2026-11-26-python-machines.txt", "| 3.646 | 0.99 | 0.92 | 0.87 | 1.51 |"),
         ("with tasks of 0.03 s, are about even at 0.3 s, and can win 1.5 times and more from 3 s on", "bench/record/zen3-2026-11-26-python-machines.txt", "3.126 | 1.30"),
     ],
     BAKING: [
@@ -454,6 +457,7 @@ SOURCES = {
         ("| under valgrind, without curves | 20 | 79 360 |", "unrecorded"),
         ("| 240 | 25 083 | nothing |", "unrecorded"),
         ("| 270 | 7 055 | no invalid access", "unrecorded"),
+        ("| 3600 | 1 591 139 | nothing |", "unrecorded"),
         ("within 10 seconds of CPU time", "crates/cli/tests/cli/damaged.rs", "const SECONDS: u32 = 10;"),
         ("rods and bars to 1 : 100 000 and needles to 1 : 1000", "setting"),
         ("CI compares 20 million answers", "unrecorded"),
