@@ -20,7 +20,8 @@ def dependencies():
     found = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)
     packages = {package["id"]: package for package in found["packages"]}
     nodes = {node["id"]: node for node in found["resolve"]["nodes"]}
-    own = [id for id in found["workspace_members"] if packages[id]["name"] != "antumbra-testkit"]
+    tools = {"antumbra-testkit", "antumbra-digest"}
+    own = [id for id in found["workspace_members"] if packages[id]["name"] not in tools]
     reached, edges, open_ids = set(), {}, list(own)
     while open_ids:
         id = open_ids.pop()
