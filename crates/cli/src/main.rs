@@ -5,7 +5,7 @@
 //! standard output.
 //!
 //! - `args/`: commands and flags, each defined once with its help
-//! - `render`, `view`, `merge`, `farm/`, `study`, `probe`, `bench`, `bake/`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
+//! - `render`, `view`, `merge`, `farm/`, `study`, `bench`, `bake/`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
 //! - `scenes`: scenes that the command line names;  `checkpoint`, `looks`: what is kept and shown of a
 //!   rendering while it lasts
 //! - `table`, `json`, `output`: results as text, JSON and files;  `archive`: files of this program's own kinds
@@ -31,7 +31,6 @@ mod looks;
 mod man;
 mod merge;
 mod output;
-mod probe;
 mod progress;
 mod render;
 mod scenes;
@@ -82,7 +81,6 @@ fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Some(Command::Farm(command)) => farm::run(&command),
         Some(Command::Study(args)) => study::run(&args, memory),
         Some(Command::Bench(args)) => bench::run(&args, memory),
-        Some(Command::Probe(args)) => probe::run(&args, memory),
         Some(Command::Ao(args)) => bake::ao::run(&args, memory, None),
         Some(Command::Sun(args)) => bake::sun::run(&args, memory, None),
         Some(Command::Visible(args)) => bake::visible::run(&args, memory, None),

@@ -31,7 +31,6 @@
 //! - `compare/`: one picture whose queries many trees answer
 //! - `rays/`, `trees`: rays of camera paths, and trees of any builder, collapse and order
 //! - `gain`: how much faster one tree is than another
-//! - `probe/`: what goes beyond a static order, tried on held-out rays
 //! - `still`: scenes whose rays need no time;  `watch`, `error`: progress, interruption, failure
 //! - `machine`, `table`, `output`: parts of all results
 // Denied, not forbidden: `bench::embree` calls a C library.
@@ -44,7 +43,6 @@ mod error;
 mod gain;
 mod machine;
 mod output;
-pub mod probe;
 mod rays;
 mod report;
 mod still;

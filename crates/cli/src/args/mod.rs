@@ -1,6 +1,6 @@
 //! Commands and flags, each defined once together with its help.
 //!
-//! - `render`, `view`, `merge`, `farm`, `study`, `probe`, `bench`, `ao`, `sun`, `visible`, `horizon`, `factors`, `info`, `image`, `list`, `man`: the flags of one
+//! - `render`, `view`, `merge`, `farm`, `study`, `bench`, `ao`, `sun`, `visible`, `horizon`, `factors`, `info`, `image`, `list`, `man`: the flags of one
 //!   command each
 //! - `camera`: flags about camera, film and light
 //! - `picture`, `tree`, `display`, `machine`, `map`, `chunks`: flags that several commands have
@@ -24,7 +24,6 @@ mod map;
 mod merge;
 mod names;
 mod picture;
-mod probe;
 mod raster;
 mod render;
 mod sensors;
@@ -59,7 +58,6 @@ pub use man::{CompletionsArgs, ManArgs};
 pub use map::MapArgs;
 pub use merge::MergeArgs;
 pub use picture::PictureArgs;
-pub use probe::ProbeArgs;
 pub use raster::RasterArgs;
 pub use render::{RenderArgs, UntilArgs};
 pub use sensors::PlaceArgs;
@@ -190,12 +188,6 @@ pub enum Command {
     ///
     /// An interrupted study with --out continues when the same command is given again.
     Study(StudyArgs),
-    /// Try what goes beyond a static child order
-    ///
-    /// Counts and times on held-out rays: per-node picks by distance, spatial splits, cost models, and a tree that learns
-    /// while the camera moves. Each is tried on the trees of the paper and on the default trees. Answers must be the
-    /// same, bit for bit, or the exit code is 1.
-    Probe(ProbeArgs),
     /// Measure rays per second, side by side with Embree
     ///
     /// The rays come from camera paths of up to five bounces: camera rays, shadow rays to the lights, and diffuse
