@@ -1,5 +1,5 @@
-//! Orders that depend on the ray: by the distance of boxes, by a rule of each node, or by the direction of the ray,
-//! from a table of permutations beside the nodes.
+//! Orders that depend on the ray: by the distance of boxes, or by the direction of the ray, from a table of permutations
+//! beside the nodes.
 
 use alloc::format;
 use alloc::vec::Vec;
@@ -20,8 +20,6 @@ pub(crate) enum ByRay {
     Distance,
     /// By the distance at which boxes are left, farthest first.
     Far,
-    /// By the rule of each node.
-    Nodes(Vec<Way>),
     /// By one of several orders that a node has, chosen by the signs of the ray's direction.
     Direction(DirectedOrder),
 }
@@ -39,10 +37,20 @@ impl ByRay {
     ) -> ([u32; N], usize) {
         let all: [u32; N] = core::array::from_fn(|lane| lane as u32);
         let mut lanes = [0; N];
-        let way = match self {
-            Self::Distance => Way::Near,
-            Self::Far => Way::Far,
-            Self::Nodes(ways) => ways[index],
+        let count = match self {
+            Self::Distance => {
+                let mut pairs = [0; N];
+                let count = entry.compress_sorted(mask, &all, &mut pairs);
+                for lane in 0..N {
+                    lanes[lane] = pairs[lane] as u32;
+                }
+                count
+            }
+            Self::Far => {
+                let count = mask.compress(&all, &mut lanes);
+                sort_by_end(ray, node, &mut lanes[..count]);
+                count
+            }
             Self::Direction(order) => {
                 let bits = mask.bits();
                 let mut count = 0;
@@ -51,22 +59,6 @@ impl ByRay {
                     lanes[count % N] = u32::from(lane);
                     count += (bits >> lane & 1) as usize;
                 }
-                return (lanes, count);
-            }
-        };
-        let count = match way {
-            Way::Slots => mask.compress(&all, &mut lanes),
-            Way::Near => {
-                let mut pairs = [0; N];
-                let count = entry.compress_sorted(mask, &all, &mut pairs);
-                for lane in 0..N {
-                    lanes[lane] = pairs[lane] as u32;
-                }
-                count
-            }
-            Way::Far => {
-                let count = mask.compress(&all, &mut lanes);
-                sort_by_end(ray, node, &mut lanes[..count]);
                 count
             }
         };
@@ -77,7 +69,6 @@ impl ByRay {
     pub fn bytes(&self) -> usize {
         match self {
             Self::Distance | Self::Far => 0,
-            Self::Nodes(ways) => ways.len(),
             Self::Direction(order) => order.bytes(),
         }
     }
@@ -87,11 +78,6 @@ impl ByRay {
         match self {
             Self::Distance => sink.word(1),
             Self::Far => sink.word(3),
-            Self::Nodes(ways) => {
-                sink.word(4);
-                let ways: Vec<u8> = ways.iter().map(|way| *way as u8).collect();
-                sink.bytes(&ways);
-            }
             Self::Direction(order) => {
                 sink.word(2);
                 order.write(sink);
@@ -99,7 +85,7 @@ impl ByRay {
         }
     }
 
-    /// Rule `number`, 1 to 4, as [`ByRay::write`] wrote it, for a tree of this many nodes.
+    /// Rule `number`, 1 to 3, as [`ByRay::write`] wrote it, for a tree of this many nodes.
     pub fn read(
         words: &mut Words<'_>,
         number: u32,
@@ -109,33 +95,9 @@ impl ByRay {
         match number {
             1 => Ok(Self::Distance),
             2 => DirectedOrder::read(words, nodes, width).map(Self::Direction),
-            3 => Ok(Self::Far),
-            _ => {
-                let ways = words.bytes(nodes)?.into_iter();
-                let ways = ways.map(|way| Way::ALL.get(usize::from(way)).copied());
-                let ways: Option<Vec<Way>> = ways.collect();
-                ways.map(Self::Nodes)
-                    .ok_or_else(|| words.error("a node picks in no known way"))
-            }
+            _ => Ok(Self::Far),
         }
     }
-}
-
-/// Rule by which one node picks its next child.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub(crate) enum Way {
-    /// The order of slots.
-    #[default]
-    Slots,
-    /// Boxes that are entered first come first.
-    Near,
-    /// Boxes that are left last come first.
-    Far,
-}
-
-impl Way {
-    pub const ALL: [Self; 3] = [Self::Slots, Self::Near, Self::Far];
 }
 
 /// Several orders for each node: one for each of the eight octants of directions, or one for each sign of the direction
@@ -212,20 +174,8 @@ impl DirectedOrder {
     }
 }
 
-/// Distance at which a ray enters a box, or of its own beginning.
-pub(crate) fn entered_at(ray: &RaySetup, bounds: &Aabb) -> f32 {
-    let [rdir, offset, _] = &ray.slabs;
-    let near = |axis: usize| match ray.negative(axis) {
-        true => bounds.max[axis],
-        false => bounds.min[axis],
-    };
-    (0..3).fold(ray.tnear, |enter, axis| {
-        max(near(axis) * rdir[axis] - offset[axis], enter)
-    })
-}
-
 /// Distance at which a ray leaves a box, wherever it ends itself.
-pub(crate) fn left_at(ray: &RaySetup, bounds: &Aabb) -> f32 {
+fn left_at(ray: &RaySetup, bounds: &Aabb) -> f32 {
     let [rdir, _, offset] = &ray.slabs;
     let far = |axis: usize| match ray.negative(axis) {
         true => bounds.min[axis],

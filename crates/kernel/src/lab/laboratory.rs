@@ -1,15 +1,12 @@
 //! The steps of learning as methods of a tree, and queries that count what they do.
 
 use alloc::vec;
-use alloc::vec::Vec;
 use core::time::Duration;
 
 use antumbra_simd::Isa;
 
-use super::by_ray::{ByRay, Way};
 use super::exclusive::{self, Events};
 use super::oracle::{self, Visits};
-use super::ways::{Distances, Measuring};
 use crate::api::bvh::Bvh;
 use crate::api::recipe::Recipe;
 use crate::builder::{self, Builder};
@@ -27,7 +24,6 @@ use crate::trace::pick::Pick;
 use crate::tree::any::on_tree;
 use crate::tree::binary::BinaryTree;
 use crate::tree::costs::CostModel;
-use crate::tree::rule::Rule;
 use crate::tree::slot_order::SlotOrder;
 use crate::tree::width::Width;
 
@@ -91,10 +87,6 @@ pub trait Laboratory: Sized {
     /// # Errors
     /// [`Error::OtherTree`] when the log is of a tree of another shape, [`Error::NeedsMasks`] when it has no masks.
     fn predicted_by(&self, log: &Log, model: &CostModel, events: Events) -> Result<f64, Error>;
-
-    /// Has each node pick its children by the order of slots, near first or far first, whichever costs these rays
-    /// least. Returns the number of nodes with each of these rules. Queries become ray by ray.
-    fn learn_ways(&mut self, rays: &[Ray], costs: &CostModel) -> [usize; 3];
 
     /// Puts children and primitives where `order` wants them. A log made before counts the old slots and is of no
     /// more use with this tree.
@@ -205,20 +197,6 @@ impl Laboratory for Bvh {
 
     fn predicted_by(&self, log: &Log, model: &CostModel, events: Events) -> Result<f64, Error> {
         on_tree!(&self.tree, tree => exclusive::predicted_cost(tree, log, model, events))
-    }
-
-    fn learn_ways(&mut self, rays: &[Ray], costs: &CostModel) -> [usize; 3] {
-        let mut occluded = vec![false; rays.len()];
-        let mut distances = Distances::default();
-        let ways: Vec<Way> = on_tree!(&self.tree, tree => {
-            let mut observer = Measuring::new(tree, &mut distances);
-            self.observe(Pick::Slots, &mut observer, rays, &mut occluded);
-            super::ways::learn_ways(tree, &distances, costs)
-        });
-        let count = |way| ways.iter().filter(|other| **other == way).count();
-        let counts = Way::ALL.map(count);
-        on_tree!(&mut self.tree, tree => tree.pick = Rule::ByRay(ByRay::Nodes(ways)));
-        counts
     }
 
     fn apply(&mut self, order: &SlotOrder) {

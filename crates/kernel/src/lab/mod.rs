@@ -26,8 +26,7 @@
 //! ```
 //!
 //! - `laboratory`: the steps of learning, and queries that count;  `oracle`: a bound for every order
-//! - `orders`: child orders of the laboratory: `random`, `rtsah`, `exclusive`, and those that look at the ray (`by_ray`,
-//!   `ways`)
+//! - `orders`: child orders of the laboratory: `random`, `rtsah`, `exclusive`, and those that look at the ray (`by_ray`)
 //! - `builders`: builders of the laboratory: `ploc`, `sbvh`, `ray_driven`, `pbrt`;
 //!   `pieces` and `candidates` serve them
 //! - `rsc`: a collapse by visits
@@ -50,7 +49,6 @@ mod rtsah;
 mod saved;
 pub(crate) mod sbvh;
 pub mod steps;
-mod ways;
 
 pub use exclusive::Events;
 pub use laboratory::Laboratory;

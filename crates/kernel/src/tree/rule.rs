@@ -43,9 +43,9 @@ impl Rule {
         match words.word()? {
             0 => Ok(Self::Slots),
             #[cfg(feature = "lab")]
-            number @ 1..=4 => ByRay::read(words, number, nodes, width).map(Self::ByRay),
+            number @ 1..=3 => ByRay::read(words, number, nodes, width).map(Self::ByRay),
             #[cfg(not(feature = "lab"))]
-            1..=4 => Err(words.error("its order looks at the ray, which needs the feature `lab`")),
+            1..=3 => Err(words.error("its order looks at the ray, which needs the feature `lab`")),
             other => Err(words.error(format!("no rule has number {other}"))),
         }
     }

@@ -1,12 +1,10 @@
-//! What goes beyond a static order: ways of picking, learning while running.
-//! None changes an answer.
+//! Learning while running, and leaves of few primitives. Neither changes an answer.
 
 use std::sync::Arc;
 
-use antumbra::cutout::Opacity;
 use antumbra::lab::{Cost, Laboratory};
-use antumbra::recipe::{Builder, Collapse, CostModel, Order};
-use antumbra::{Bvh, Functions, Instance, Primitives, Ray, RayMemory, Recipe, Width};
+use antumbra::recipe::{Builder, Collapse, Order};
+use antumbra::{Bvh, Instance, Primitives, Ray, RayMemory, Recipe};
 use antumbra_testkit::{Rng, mesh};
 
 use crate::support::{Stripes, cutouts, geometry};
@@ -41,32 +39,6 @@ fn node_tests(bvh: &Bvh, rays: &[Ray]) -> u64 {
     let mut costs = vec![Cost::default(); rays.len()];
     bvh.occluded_batch_counted(rays, &mut vec![false; rays.len()], &mut costs);
     costs.iter().map(|cost| u64::from(cost.node_tests)).sum()
-}
-
-/// A way of picking for each node costs the training rays no more than the order of slots, and answers the same.
-#[test]
-fn nodes_pick_in_their_own_ways() {
-    let (primitives, rays) = world(94);
-    let (training, test) = rays.split_at(3000);
-    for width in Width::ALL {
-        let recipe = Recipe::default()
-            .collapse(Collapse::Area)
-            .order(Order::Simple)
-            .width(width);
-        let bvh = Bvh::build(&primitives, &recipe).expect("a tree");
-        let mut picking = bvh.clone();
-        let ways = picking.learn_ways(training, &CostModel::default());
-        assert!(ways[1] + ways[2] > 0, "{ways:?}");
-        assert_eq!(answers(&picking, test), answers(&bvh, test));
-        assert!(node_tests(&picking, training) < node_tests(&bvh, training));
-        // Saved and read again it picks in the same ways.
-        let stripes: Arc<dyn Opacity> = Arc::new(Stripes { count: 5.0 });
-        let functions = Functions::new().filters(vec![stripes]);
-        let read = functions.from_bytes(&picking.to_bytes());
-        let read: Bvh = read.expect("a file of ours");
-        assert_eq!(answers(&read, test), answers(&bvh, test));
-        assert_eq!(node_tests(&read, training), node_tests(&picking, training));
-    }
 }
 
 /// Instances and cut-outs too, from a sample of the batches.

@@ -17,7 +17,7 @@
 //! - [`user`]: user geometry, sound and not
 //! - [`saved`]: trees and orders in files
 //! - [`dropped`]: what was dropped is named; trees know their primitives
-//! - [`beyond`]: ways of picking, learning while running
+//! - [`beyond`]: learning while running, small leaves
 //! - [`batches`]: batches of every length, on one thread and several
 //! - [`groups`]: rays of many points in the same directions
 //! - [`origin_offset`]: rays that leave a surface visit nothing of it

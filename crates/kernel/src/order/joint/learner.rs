@@ -16,12 +16,12 @@ const ROUNDS: usize = 2;
 
 /// Weight of a ray in a node that it does not come to, because something occludes it before. See
 /// `docs/notes/kernel.md`.
-pub(crate) const STOPPED: f64 = 0.05;
+const STOPPED: f64 = 0.05;
 
 /// Goes through the nodes, children first, with the costs of the nodes below known.
 pub(crate) struct Learner<'a, const N: usize> {
-    pub bvh: &'a WideTree<N>,
-    pub model: &'a CostModel,
+    bvh: &'a WideTree<N>,
+    model: &'a CostModel,
     pub visits: &'a [Visit],
     /// Visits by node, and where the visits of each node begin. In an order that depends on nothing but the rays, so
     /// that sums come out the same.
@@ -30,8 +30,8 @@ pub(crate) struct Learner<'a, const N: usize> {
     /// Cost of each visit, once its node is sorted.
     pub costs: Vec<f64>,
     /// Whether the ray comes to the node of each visit.
-    pub arrives: Vec<bool>,
-    pub passages: Vec<Passage<N>>,
+    arrives: Vec<bool>,
+    passages: Vec<Passage<N>>,
 }
 
 impl<'a, const N: usize> Learner<'a, N> {
@@ -122,7 +122,7 @@ impl<'a, const N: usize> Learner<'a, N> {
     }
 
     /// Collects the rays in a node and what each child costs each of them.
-    pub fn gather(&mut self, index: usize) {
+    fn gather(&mut self, index: usize) {
         let fixed = self.fixed_costs(&self.bvh.nodes[index]);
         self.passages.clear();
         for &place in &self.places[self.firsts[index]..self.firsts[index + 1]] {
