@@ -5,7 +5,6 @@ use core::time::Duration;
 
 use antumbra_simd::Isa;
 
-use super::exclusive::{self, Events};
 use super::oracle::{self, Visits};
 use crate::api::bvh::Bvh;
 use crate::api::recipe::Recipe;
@@ -80,13 +79,6 @@ pub trait Laboratory: Sized {
         model: &CostModel,
         order: Option<&SlotOrder>,
     ) -> Result<f64, Error>;
-
-    /// Mean cost of an occlusion query in the tree as it is, by a model of how events at children depend on each other.
-    /// The log has [masks](LogKind::masks).
-    ///
-    /// # Errors
-    /// [`Error::OtherTree`] when the log is of a tree of another shape, [`Error::NeedsMasks`] when it has no masks.
-    fn predicted_by(&self, log: &Log, model: &CostModel, events: Events) -> Result<f64, Error>;
 
     /// Puts children and primitives where `order` wants them. A log made before counts the old slots and is of no
     /// more use with this tree.
@@ -193,10 +185,6 @@ impl Laboratory for Bvh {
         order: Option<&SlotOrder>,
     ) -> Result<f64, Error> {
         self.predicted_cost(log, model, order)
-    }
-
-    fn predicted_by(&self, log: &Log, model: &CostModel, events: Events) -> Result<f64, Error> {
-        on_tree!(&self.tree, tree => exclusive::predicted_cost(tree, log, model, events))
     }
 
     fn apply(&mut self, order: &SlotOrder) {

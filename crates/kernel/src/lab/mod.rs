@@ -26,7 +26,7 @@
 //! ```
 //!
 //! - `laboratory`: the steps of learning, and queries that count;  `oracle`: a bound for every order
-//! - `orders`: child orders of the laboratory: `random`, `rtsah`, `exclusive`, and those that look at the ray (`by_ray`)
+//! - `orders`: child orders of the laboratory: `random`, `rtsah`, and those that look at the ray (`by_ray`)
 //! - `builders`: builders of the laboratory: `ploc`, `sbvh`, `ray_driven`, `pbrt`;
 //!   `pieces` and `candidates` serve them
 //! - `rsc`: a collapse by visits
@@ -35,7 +35,6 @@
 pub(crate) mod builders;
 pub(crate) mod by_ray;
 pub(crate) mod candidates;
-pub(crate) mod exclusive;
 mod laboratory;
 mod oracle;
 pub(crate) mod orders;
@@ -50,7 +49,6 @@ mod saved;
 pub(crate) mod sbvh;
 pub mod steps;
 
-pub use exclusive::Events;
 pub use laboratory::Laboratory;
 pub use oracle::Visits;
 

@@ -3,7 +3,7 @@
 use alloc::vec::Vec;
 
 use super::by_ray::{ByRay, DirectedOrder};
-use super::{exclusive, random, rtsah};
+use super::{random, rtsah};
 use crate::error::Error;
 use crate::learn::Log;
 use crate::order::Order;
@@ -35,7 +35,6 @@ pub(crate) fn plan<const N: usize>(
         Order::Ftob => Ok(by_ray(ByRay::Distance)),
         Order::Far => Ok(by_ray(ByRay::Far)),
         Order::Rtsah => Ok(rtsah::plan(bvh, model)),
-        Order::Pairs => exclusive::plan(bvh, order, needed()?, model),
         Order::TwoWay => joint::plan(bvh, order, needed()?, model, Directions::Two),
         Order::Octants => joint::plan(bvh, order, needed()?, model, Directions::Eight),
         _ => Ok(SlotOrder::as_built(bvh.shape())),

@@ -72,9 +72,6 @@ named_list! {
         Visits = "visits",
             "Learned as `sort`, with hits of a child counted against the rays that came to it",
             None, Properties::learns(LogKind { boxes: true, shuffled: false, masks: false });
-        Pairs if "lab" = "pairs",
-            "Least cost by a model of exclusive events: pairs of children hit and occluding are counted",
-            None, Properties::learns(MASKS);
         #[default]
         Joint = "joint",
             "Least measured cost of the training rays; children need not be independent",
