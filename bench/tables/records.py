@@ -9,7 +9,7 @@ import re
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
 PAPER = "crates/lab/src/report/paper.csv"
-ORDERS = "simple random ftob sato embree rtsah sort- sort sort+ visits joint two-way octants".split()
+ORDERS = "simple random ftob sato embree rtsah sort- sort sort+ visits joint".split()
 PAPER_ORDERS = "simple ftob sato sort- sort sort+".split()
 PRIM = 0.15  # cost of a primitive test in node tests
 LAB10, LAB4, STUDY, PAPER_RUN = (

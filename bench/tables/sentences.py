@@ -74,7 +74,7 @@ def counted(of):
     }
     yield RESULTS, f"on scans, where it takes about {' to '.join(sorted(more))} % more"
     shares = [100 * 4096 / of.number(r, "shadow_rays") for rows in paper.values() for r in rows.all if r["order"] == "joint"]
-    yield RESULTS, f"`joint`, `two-way` and `octants` learn from 4096 rays, {two(shares, 1)} %"
+    yield RESULTS, f"`joint` learns from 4096 rays, {two(shares, 1)} %"
     shares = [100 * of.number(r, "shadow_share") for r in paper[8].all]
     yield ORDER, f"In path tracing they are {two(shares, 0)} % of the rays of our scenes"
     yield RESULTS, of.seeds_sentence()

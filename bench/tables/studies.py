@@ -79,7 +79,7 @@ def ablation():
 def many_builders(rays):
     rows = Rows(record(LAB4), rays)
     trees = "binned-sah reinsertion ploc ploc-reinsertion sbvh rdh srdh".split()
-    return builders(rows, trees, ["area", "learned"], "simple sato sort+ joint two-way octants".split())
+    return builders(rows, trees, ["area", "learned"], "simple sato sort+ joint".split())
 
 
 def gaps():

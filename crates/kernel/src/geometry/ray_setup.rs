@@ -354,13 +354,6 @@ impl RaySetup {
         self.near[axis] == Side::High
     }
 
-    /// The signs of the direction: bit 0 is set when it is negative on x, bit 1 on y, bit 2 on z.
-    #[inline(always)]
-    pub fn octant(&self) -> usize {
-        let [x, y, z, _] = self.near.map(|side| side as usize);
-        x | y << 1 | z << 2
-    }
-
     /// The ray on the axes of its shear.
     #[inline(always)]
     pub fn sheared(&self) -> ShearedRay {

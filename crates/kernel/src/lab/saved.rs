@@ -148,7 +148,7 @@ impl SlotOrder {
             shape,
             slots,
             lanes,
-            pick: Rule::read(words, nodes, width)?,
+            pick: Rule::read(words)?,
         })
     }
 }
@@ -239,7 +239,7 @@ impl RayLog {
             sink.word(visit.node);
             sink.word(visit.len);
             sink.word(u32::from(visit.hit) | u32::from(visit.occluding) << 16);
-            sink.word(u32::from(visit.followed) | u32::from(visit.octant) << 16);
+            sink.word(visit.followed.into());
         }
     }
 
@@ -257,20 +257,19 @@ impl RayLog {
             return Err(words.error("it counts other visits than it holds"));
         }
         let visits = words.list([], visits, |words| {
-            let [node, len, boxes, rest] = words.words()?;
+            // Files of older versions have the octant of the ray above `followed`.
+            let [node, len, boxes, followed] = words.words()?;
             let visit = Visit {
                 node,
                 len,
                 hit: boxes as u16,
                 occluding: (boxes >> 16) as u16,
-                followed: rest as u16,
-                octant: (rest >> 16) as u8,
+                followed: followed as u16,
             };
             let slots = visit.hit | visit.occluding | visit.followed;
             let is_sound = (node as usize) < shape.nodes
                 && u32::from(slots) >> shape.width == 0
-                && (visit.occluding | visit.followed) & !visit.hit == 0
-                && rest >> 16 < 8;
+                && (visit.occluding | visit.followed) & !visit.hit == 0;
             if is_sound {
                 Ok(visit)
             } else {
@@ -313,7 +312,7 @@ fn is_nested(visits: &[Visit]) -> bool {
 }
 
 /// Whether every number below the count is there.
-pub(crate) fn is_permutation(numbers: &[u8]) -> bool {
+fn is_permutation(numbers: &[u8]) -> bool {
     let found = numbers.iter().fold(0u32, |found, number| {
         found | 1u32.checked_shl((*number).into()).unwrap_or(0)
     });

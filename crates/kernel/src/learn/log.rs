@@ -244,7 +244,7 @@ impl Observer for Logging<'_> {
         self.instance = None;
     }
 
-    fn node(&mut self, visit: &NodeVisit<'_>) -> u32 {
+    fn node(&mut self, visit: &NodeVisit) -> u32 {
         self.log.enter_node(visit.node, visit.lanes);
         self.counting.node(visit)
     }

@@ -24,9 +24,6 @@ pub(crate) struct Visit {
     pub occluding: u16,
     /// Slots hit below which the ray comes to a node: inner ones, and instances that let it in.
     pub followed: u16,
-    /// The signs of its direction, in the space of the node: see
-    /// [`RaySetup::octant`](crate::geometry::ray_setup::RaySetup::octant).
-    pub octant: u8,
 }
 
 /// One ray.
@@ -132,7 +129,7 @@ impl Observer for Following<'_> {
         true
     }
 
-    fn node(&mut self, visit: &NodeVisit<'_>) -> u32 {
+    fn node(&mut self, visit: &NodeVisit) -> u32 {
         let number = self.from.len() as u32;
         self.from.push(visit.from);
         // Slots are in descending lanes.
@@ -143,7 +140,6 @@ impl Observer for Following<'_> {
             hit: hit as u16,
             occluding: 0,
             followed: 0,
-            octant: visit.ray.octant() as u8,
         });
         number
     }

@@ -25,7 +25,6 @@ use crate::tree::slot_order::SlotOrder;
 use crate::tree::wide::WideTree;
 use antumbra_simd::named_list;
 
-use joint::Directions;
 use ratio::Estimate;
 
 named_list! {
@@ -75,22 +74,10 @@ named_list! {
         #[default]
         Joint = "joint",
             "Least measured cost of the training rays; children need not be independent",
-            None, Properties::learns(MASKS);
-        TwoWay if "lab" = "two-way",
-            "Learned as `joint`, two orders per node by the sign of the ray on one axis",
-            None, Properties { picks_by_ray: true, ..Properties::learns(MASKS) };
-        Octants if "lab" = "octants",
-            "Learned as `joint`, eight orders per node by the octant of the ray",
-            None, Properties { picks_by_ray: true, ..Properties::learns(MASKS) };
+            // Masks are equal whether shuffled or not; shuffled, `sort+` can share the log.
+            None, Properties::learns(LogKind { boxes: true, shuffled: true, masks: true });
     }
 }
-
-/// What `joint` and its relatives log. Masks are equal whether shuffled or not; shuffled, `sort+` can share the log.
-const MASKS: LogKind = LogKind {
-    boxes: true,
-    shuffled: true,
-    masks: true,
-};
 
 /// Columns of the table of orders.
 pub(crate) struct Properties {
@@ -156,9 +143,9 @@ pub(crate) fn plan<const N: usize>(
         Order::SortMinus => ratio::plan(bvh, needed()?, model, Estimate::Poor),
         Order::Sort | Order::SortPlus => ratio::plan(bvh, with_boxes()?, model, Estimate::Precise),
         Order::Visits => ratio::plan(bvh, with_boxes()?, model, Estimate::Visited),
-        Order::Joint => joint::plan(bvh, order, needed()?, model, Directions::One),
+        Order::Joint => joint::plan(bvh, needed()?, model),
         #[cfg(feature = "lab")]
-        order => crate::lab::orders::plan(bvh, order, log, model),
+        order => Ok(crate::lab::orders::plan(bvh, order, model)),
     }
 }
 

@@ -91,7 +91,6 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
                     from,
                     lanes: mask.bits(),
                     width: N,
-                    ray,
                 });
                 let hit = (mask, entry);
                 let (lanes, count) = pick.lanes::<N, NodeLanes<S, N>>(bvh, index, ray, hit);
@@ -183,7 +182,7 @@ mod tests {
             self.goes_on
         }
 
-        fn node(&mut self, visit: &NodeVisit<'_>) -> u32 {
+        fn node(&mut self, visit: &NodeVisit) -> u32 {
             if visit.from == Place::NONE {
                 assert_eq!(
                     (visit.node, self.nodes.len()),

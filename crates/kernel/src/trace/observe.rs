@@ -2,7 +2,6 @@
 //!
 //! Logs are observers, too. They lie in [`crate::learn`], where they are used.
 
-use crate::geometry::ray_setup::RaySetup;
 use crate::ray::Ray;
 
 /// Receives what happens to occlusion rays in [`crate::trace::instrumented`]. A method does nothing unless overridden.
@@ -20,7 +19,7 @@ pub(crate) trait Observer {
 
     /// The boxes of a node are tested, all at once. The number returned comes back in [`Place::visit`] with every
     /// child of the node.
-    fn node(&mut self, _visit: &NodeVisit<'_>) -> u32 {
+    fn node(&mut self, _visit: &NodeVisit) -> u32 {
         0
     }
 
@@ -38,7 +37,7 @@ pub(crate) trait Observer {
 }
 
 /// A ray at a node.
-pub(crate) struct NodeVisit<'a> {
+pub(crate) struct NodeVisit {
     /// Index of the node in the tree.
     pub node: usize,
     /// Slot from which the ray comes; for the root of an object, the slot of the instance.
@@ -47,8 +46,6 @@ pub(crate) struct NodeVisit<'a> {
     pub lanes: u32,
     /// Number of lanes of the node.
     pub width: usize,
-    /// The ray in the space of the node.
-    pub ray: &'a RaySetup,
 }
 
 /// A slot of a node that the ray has visited.
@@ -111,7 +108,7 @@ impl Observer for Counting<'_> {
         self.current = index;
     }
 
-    fn node(&mut self, visit: &NodeVisit<'_>) -> u32 {
+    fn node(&mut self, visit: &NodeVisit) -> u32 {
         let cost = &mut self.costs[self.current];
         cost.node_tests += 1;
         cost.top_node_tests += u32::from(visit.node < self.top_nodes);

@@ -156,7 +156,7 @@ impl Pick {
     ) -> ([u32; N], usize) {
         #[cfg(feature = "lab")]
         if let (Self::Rule, Rule::ByRay(rule)) = (&self, &bvh.pick) {
-            return rule.lanes((index, &bvh.nodes[index]), ray, mask, entry);
+            return rule.lanes(&bvh.nodes[index], ray, mask, entry);
         }
         let all: [u32; N] = core::array::from_fn(|lane| lane as u32);
         let mut lanes = [0; N];

@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::lab::by_ray::ByRay;
 
 /// How the occlusion queries of a tree pick. Trees are given a rule together with the places of their slots.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Rule {
     /// In the order of slots.
     #[default]
@@ -19,17 +19,8 @@ pub(crate) enum Rule {
 }
 
 impl Rule {
-    /// Bytes of the rule beside the tree.
-    pub fn bytes(&self) -> usize {
-        match self {
-            Self::Slots => 0,
-            #[cfg(feature = "lab")]
-            Self::ByRay(rule) => rule.bytes(),
-        }
-    }
-
-    /// Writes the rule and its tables.
-    pub fn write(&self, sink: &mut Sink<'_>) {
+    /// Writes the number of the rule.
+    pub fn write(self, sink: &mut Sink<'_>) {
         match self {
             Self::Slots => sink.word(0),
             #[cfg(feature = "lab")]
@@ -37,16 +28,16 @@ impl Rule {
         }
     }
 
-    /// A rule for a tree of so many nodes.
-    #[cfg_attr(not(feature = "lab"), allow(unused_variables))]
-    pub fn read(words: &mut Words<'_>, nodes: usize, width: usize) -> Result<Self, Error> {
-        match words.word()? {
-            0 => Ok(Self::Slots),
-            #[cfg(feature = "lab")]
-            number @ 1..=3 => ByRay::read(words, number, nodes, width).map(Self::ByRay),
-            #[cfg(not(feature = "lab"))]
-            1..=3 => Err(words.error("its order looks at the ray, which needs the feature `lab`")),
-            other => Err(words.error(format!("no rule has number {other}"))),
+    /// A rule as [`Rule::write`] wrote it.
+    pub fn read(words: &mut Words<'_>) -> Result<Self, Error> {
+        let number = words.word()?;
+        if number == 0 {
+            return Ok(Self::Slots);
         }
+        #[cfg(feature = "lab")]
+        if let Some(rule) = ByRay::read(number) {
+            return Ok(Self::ByRay(rule));
+        }
+        Err(words.error(format!("no rule has number {number}")))
     }
 }

@@ -117,7 +117,7 @@ impl<const N: usize> WideTree<N> {
             pick: Rule::Slots,
             motion: None,
         };
-        tree.pick = Rule::read(words, tree.nodes.len(), N)?;
+        tree.pick = Rule::read(words)?;
         let walked = tree.walk(&boxes).map_err(|broken| words.error(broken))?;
         tree.depth = walked.levels(0);
         Ok((tree, walked))

@@ -9,13 +9,12 @@ use crate::aabb::Aabb;
 use crate::tree::costs::CostModel;
 
 impl<const N: usize> WideTree<N> {
-    /// Bytes of nodes, leaf blocks, instances, opacity micromaps, and orders that are looked up.
+    /// Bytes of nodes, leaf blocks, instances and opacity micromaps.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.nodes[..])
             + self.leaf_bytes()
             + size_of_val(&self.instances[..])
             + self.filters.bytes()
-            + self.pick.bytes()
     }
 
     /// Cost of a random line by the surface area heuristic, see [`crate::BuildReport`].

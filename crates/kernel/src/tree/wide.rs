@@ -96,6 +96,6 @@ impl<const N: usize> WideTree<N> {
         if !order.lanes.is_empty() {
             self.permute_leaves(&order.lanes);
         }
-        self.pick = order.pick.clone();
+        self.pick = order.pick;
     }
 }

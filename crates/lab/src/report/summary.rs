@@ -579,7 +579,7 @@ mod tests {
         let plan = plan(1);
         let [paper, default] = ends(WIDTH);
         let by_ray = Combination {
-            order: Order::TwoWay,
+            order: Order::Ftob,
             ..default
         };
         let mut figures = vec![

@@ -8,18 +8,14 @@ use crate::order::arrange::{Costs, EXACT, arrange};
 
 /// The order in which children that occlude any ray come first, as is cheapest, and the others follow in the order of
 /// `ratio`.
-pub(crate) fn least_cost<const N: usize>(
-    passages: &[Passage<N>],
-    ratio: &[u8; N],
-    weight: &dyn Fn(&Passage<N>) -> f64,
-) -> [u8; N] {
+pub(crate) fn least_cost<const N: usize>(passages: &[Passage<N>], ratio: &[u8; N]) -> [u8; N] {
     let any = passages
         .iter()
         .fold(0, |any, passage| any | passage.occluding);
     let mut order = *ratio;
     order.sort_by_key(|slot| any >> slot & 1 == 0);
     let first = &mut order[..any.count_ones() as usize];
-    let groups = Groups::new(passages, first, weight);
+    let groups = Groups::new(passages, first);
     let arranged = if first.len() <= EXACT {
         arrange(first.len(), &groups.table())
     } else {
@@ -49,7 +45,7 @@ struct Group<const N: usize> {
 
 impl<const N: usize> Groups<N> {
     /// Groups for the order of only these children.
-    fn new(passages: &[Passage<N>], children: &[u8], weight: &dyn Fn(&Passage<N>) -> f64) -> Self {
+    fn new(passages: &[Passage<N>], children: &[u8]) -> Self {
         // Rays that nothing occludes cost the same in any order; so do those that hit but one box.
         let mut stopped: Vec<_> = passages
             .iter()
@@ -68,7 +64,7 @@ impl<const N: usize> Groups<N> {
                     costs: [0.0; N],
                 };
                 for passage in passages {
-                    let weight = weight(passage);
+                    let weight = passage.weight;
                     group.weight += weight;
                     for (cost, &slot) in group.costs.iter_mut().zip(children) {
                         *cost += weight * passage.costs[slot as usize];

@@ -1,10 +1,10 @@
-//! The walk through the nodes of a tree that learns the orders of all of them.
+//! The walk through the nodes of a tree that learns the order of each.
 
 use alloc::vec;
 use alloc::vec::Vec;
 
-use super::node_orders::{Directions, NodeOrders, node_orders};
-use super::passage::Passage;
+use super::groups::least_cost;
+use super::passage::{Passage, by_ratio};
 use crate::learn::ray_log::{RayLog, Visit};
 use crate::order::sorted_slots;
 use crate::tree::costs::CostModel;
@@ -66,32 +66,32 @@ impl<'a, const N: usize> Learner<'a, N> {
     }
 
     /// The orders of all nodes.
-    pub fn learn(&mut self, directions: Directions) -> Vec<NodeOrders<N>> {
-        let mut by_node = self.sort_all(directions);
+    pub fn learn(&mut self) -> Vec<[u8; N]> {
+        let mut by_node = self.sort_all();
         for _ in 1..ROUNDS {
             self.trace(&by_node);
-            by_node = self.sort_all(directions);
+            by_node = self.sort_all();
         }
         by_node
     }
 
     /// Finds the orders of all nodes for the rays that arrive.
-    pub fn sort_all(&mut self, directions: Directions) -> Vec<NodeOrders<N>> {
-        let mut by_node = vec![NodeOrders::one([0; N]); self.bvh.nodes.len()];
+    pub fn sort_all(&mut self) -> Vec<[u8; N]> {
+        let mut by_node = vec![[0; N]; self.bvh.nodes.len()];
         // Children follow their parents, so going backwards visits them first.
-        for (node, orders) in by_node.iter_mut().enumerate().rev() {
-            *orders = self.sort(node, directions);
+        for (node, order) in by_node.iter_mut().enumerate().rev() {
+            *order = self.sort(node);
         }
         by_node
     }
 
     /// Finds out how far the rays come in these orders.
-    fn trace(&mut self, by_node: &[NodeOrders<N>]) {
+    fn trace(&mut self, by_node: &[[u8; N]]) {
         // A visit comes before the visits below it.
         for (place, visit) in self.visits.iter().enumerate() {
             let mut entered = 0;
             if self.arrives[place] {
-                for slot in by_node[visit.node as usize].of(visit.octant as usize) {
+                for slot in by_node[visit.node as usize] {
                     entered |= 1 << slot;
                     if visit.occluding >> slot & 1 == 1 {
                         break;
@@ -106,19 +106,18 @@ impl<'a, const N: usize> Learner<'a, N> {
         }
     }
 
-    /// Finds the orders of a node, the nodes below it being done.
-    fn sort(&mut self, index: usize, directions: Directions) -> NodeOrders<N> {
+    /// Finds the order of a node, the nodes below it being done.
+    fn sort(&mut self, index: usize) -> [u8; N] {
         let node = &self.bvh.nodes[index];
         self.gather(index);
         if self.passages.is_empty() {
-            return NodeOrders::one(sorted_slots(node, &[0.0; N]));
+            return sorted_slots(node, &[0.0; N]);
         }
-        let orders = node_orders(node, &self.passages, directions);
+        let order = least_cost(&self.passages, &by_ratio(node, &self.passages));
         for passage in &self.passages {
-            let order = orders.of(passage.octant as usize);
             self.costs[passage.visit] = f64::from(self.model.node) + passage.cost(&order);
         }
-        orders
+        order
     }
 
     /// Collects the rays in a node and what each child costs each of them.
@@ -131,7 +130,6 @@ impl<'a, const N: usize> Learner<'a, N> {
                 hit,
                 occluding,
                 followed,
-                octant,
                 ..
             } = self.visits[visit];
             let mut costs = [0.0; N];
@@ -149,7 +147,6 @@ impl<'a, const N: usize> Learner<'a, N> {
                 visit,
                 hit,
                 occluding,
-                octant,
                 weight: if self.arrives[visit] { 1.0 } else { STOPPED },
                 costs,
             });

@@ -1,4 +1,4 @@
-//! The orders of least measured cost: they minimise what the rays of a log would really have cost, without the
+//! The order of least measured cost: it minimises what the rays of a log would really have cost, without the
 //! assumption of the paper's model that hits of different children are independent.
 //!
 //! The log says of every ray and every node that it comes to which boxes it hits and below which of them something
@@ -16,18 +16,11 @@
 //! sorted. Rays that something else occludes before count little then, but not nothing (`STOPPED`), so that few rays do
 //! not decide by themselves.
 //!
-//! With [`Directions`] a node has several orders, each learned from the rays that will use it. The other rays
-//! count a little, for the same reason.
-//!
-//! - `learner`: the walk through all nodes;  `passage`: rays in one node
-//! - `node_orders`: the orders of one node;  `groups`: the cheapest of them
+//! - `learner`: the walk through all nodes;  `passage`: rays in one node;  `groups`: the cheapest order of one node
 
-use alloc::vec;
-
-pub(crate) mod groups;
-pub(crate) mod learner;
-mod node_orders;
-pub(crate) mod passage;
+mod groups;
+mod learner;
+mod passage;
 #[cfg(test)]
 mod tests;
 
@@ -36,44 +29,25 @@ use crate::learn::log::Log;
 use crate::order::Order;
 use crate::order::ratio::sorted_lanes;
 use crate::tree::costs::CostModel;
-use crate::tree::rule::Rule;
 use crate::tree::slot_order::SlotOrder;
 use crate::tree::wide::WideTree;
 use learner::Learner;
 
-pub(crate) use node_orders::Directions;
-#[cfg(feature = "lab")]
-pub(crate) use node_orders::NodeOrders;
-
 /// Works out the order of least measured cost.
 pub(crate) fn plan<const N: usize>(
     bvh: &WideTree<N>,
-    order: Order,
     log: &Log,
     model: &CostModel,
-    directions: Directions,
 ) -> Result<SlotOrder, Error> {
     Error::unless_fits(log.shape(), bvh.shape())?;
-    let rays = log.masks().ok_or(Error::NeedsMasks(order.name()))?;
-    let by_node = Learner::new(bvh, rays, model).learn(directions);
-    let mut slots = vec![0; bvh.nodes.len() * N];
-    for (slots, orders) in slots.chunks_mut(N).zip(&by_node) {
-        slots.copy_from_slice(&orders.all);
-    }
-    let pick = match directions {
-        Directions::One => Rule::Slots,
-        #[cfg(feature = "lab")]
-        Directions::Two => Rule::ByRay(crate::lab::orders::directed(&by_node, 2)),
-        #[cfg(feature = "lab")]
-        Directions::Eight => Rule::ByRay(crate::lab::orders::directed(&by_node, 8)),
-    };
+    let rays = log.masks().ok_or(Error::NeedsMasks(Order::Joint.name()))?;
+    let by_node = Learner::new(bvh, rays, model).learn();
     let lanes = (0..bvh.leaf_count())
         .map(|leaf| sorted_lanes(log.prim_hits(leaf)))
         .collect();
     Ok(SlotOrder {
-        slots,
+        slots: by_node.into_flattened(),
         lanes,
-        pick,
         ..SlotOrder::as_built(bvh.shape())
     })
 }

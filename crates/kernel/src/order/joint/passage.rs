@@ -12,8 +12,6 @@ pub(crate) struct Passage<const N: usize> {
     pub hit: u16,
     /// Slots of `hit` below which something occludes it.
     pub occluding: u16,
-    /// Octant of its direction.
-    pub octant: u8,
     /// Weight of the ray in the costs of the node.
     pub weight: f64,
     /// Cost of entering each child; 0 for those whose boxes it misses.

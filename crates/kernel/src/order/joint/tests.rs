@@ -8,7 +8,6 @@ use crate::geometry::{Geometry, Instance};
 use crate::lab::Laboratory;
 use crate::learn::log::Log;
 use crate::order::Order;
-use crate::order::joint::Directions;
 use crate::order::joint::groups::least_cost;
 use crate::order::joint::learner::Learner;
 use crate::order::joint::passage::Passage;
@@ -31,12 +30,6 @@ const MODEL: CostModel = CostModel {
     entry: 0.0,
     cutout: 0.5,
 };
-
-const KINDS: [(Order, Directions); 3] = [
-    (Order::Joint, Directions::One),
-    (Order::TwoWay, Directions::Two),
-    (Order::Octants, Directions::Eight),
-];
 
 fn rays(rng: &mut Rng, count: usize) -> Vec<Ray> {
     (0..count)
@@ -82,10 +75,10 @@ fn measured(bvh: &Bvh, rays: &[Ray]) -> f64 {
 }
 
 /// Cost of the rays of a log by the learner's account once everything is sorted.
-fn accounted<const N: usize>(bvh: &WideTree<N>, log: &Log, directions: Directions) -> f64 {
+fn accounted<const N: usize>(bvh: &WideTree<N>, log: &Log) -> f64 {
     let rays = log.masks().expect("masks");
     let mut learner = Learner::new(bvh, rays, &MODEL);
-    learner.learn(directions);
+    learner.learn();
     total(&learner)
 }
 
@@ -122,24 +115,17 @@ fn trees(seed: u64, check: impl Fn(&str, &Bvh, &[Ray], &Log)) {
 }
 
 /// The account is right: the rays of the log cost exactly that when they are traced in the tree so ordered, on one
-/// level and on two, with one order for a node or several.
+/// level and on two.
 #[test]
 fn costs_are_those_that_are_measured() {
     trees(91, |place, built, rays, log| {
-        let mut last = f64::INFINITY;
-        for (order, directions) in KINDS {
-            let mut bvh = built.clone();
-            bvh.apply(&bvh.plan(order, Some(log), &MODEL).expect("a log"));
-            let accounted = on_tree!(&built.tree, tree => accounted(tree, log, directions));
-            let cost = measured(&bvh, rays);
-            assert_eq!(cost, accounted, "{place} {order}");
-            assert!(cost < measured(built, rays), "{place} {order}");
-            assert!(
-                cost < last,
-                "{place} {order}: {cost} with more orders, {last} before"
-            );
-            last = cost;
-        }
+        let mut bvh = built.clone();
+        let plan = bvh.plan(Order::Joint, Some(log), &MODEL);
+        bvh.apply(&plan.expect("a log"));
+        let accounted = on_tree!(&built.tree, tree => accounted(tree, log));
+        let cost = measured(&bvh, rays);
+        assert_eq!(cost, accounted, "{place}");
+        assert!(cost < measured(built, rays), "{place}");
     });
 }
 
@@ -147,15 +133,13 @@ fn costs_are_those_that_are_measured() {
 #[test]
 fn a_second_round_pays() {
     trees(95, |place, bvh, _, log| {
-        for (order, directions) in KINDS {
-            on_tree!(&bvh.tree, tree => {
-                let mut learner = Learner::new(tree, log.masks().expect("masks"), &MODEL);
-                learner.sort_all(directions);
-                let once = total(&learner);
-                let cost = accounted(tree, log, directions);
-                assert!(cost < once, "{place} {order}: {cost} after {once}");
-            });
-        }
+        on_tree!(&bvh.tree, tree => {
+            let mut learner = Learner::new(tree, log.masks().expect("masks"), &MODEL);
+            learner.sort_all();
+            let once = total(&learner);
+            let cost = accounted(tree, log);
+            assert!(cost < once, "{place}: {cost} after {once}");
+        });
     });
 }
 
@@ -225,7 +209,6 @@ fn what_is_stopped_already_is_not_counted_again() {
         visit: 0,
         hit: 0b111,
         occluding,
-        octant: 0,
         weight: 1.0,
         costs: [1.0, 1.0, 1.0, 0.0],
     };
@@ -233,7 +216,7 @@ fn what_is_stopped_already_is_not_counted_again() {
         .map(|ray| passage(if ray < 6 { 0b011 } else { 0b100 }))
         .collect();
     let ratio = [0, 1, 2, 3];
-    let order = least_cost(&passages, &ratio, &|_| 1.0);
+    let order = least_cost(&passages, &ratio);
     assert_eq!(order, [0, 2, 1, 3]);
 }
 
@@ -257,9 +240,7 @@ fn orders_do_not_depend_on_the_division_of_rays() {
         parts.merge(&log(&bvh, part));
     }
     assert_eq!(parts, whole);
-    for (order, _) in KINDS {
-        // Costs that are no sums of powers of two.
-        let plan = |log| bvh.plan(order, Some(log), &CostModel::default());
-        assert_eq!(plan(&parts), plan(&whole), "{order}");
-    }
+    // Costs that are no sums of powers of two.
+    let plan = |log| bvh.plan(Order::Joint, Some(log), &CostModel::default());
+    assert_eq!(plan(&parts), plan(&whole));
 }

@@ -230,7 +230,7 @@ fn saved_trees_answer_as_built_ones_at_the_same_cost() {
         let (primitives, rays) = (scene.primitives(), &scene.rays[..]);
         let brute = Brute::new(&primitives);
         for width in Width::ALL {
-            for order in [Order::Joint, Order::TwoWay, Order::Octants, Order::Ftob] {
+            for order in [Order::Joint, Order::Ftob] {
                 let recipe = Recipe::default().width(width).order(order);
                 let built = Bvh::learn(&primitives, rays, &recipe).expect("a tree");
                 let bytes = saved(&built);

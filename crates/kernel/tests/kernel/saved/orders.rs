@@ -14,7 +14,7 @@ fn orders_come_back_and_forged_ones_are_refused() {
     let mut rng = Rng::new(11);
     let (primitives, rays) = scene(12, 60);
     let (mut refused, mut taken) = (0, 0);
-    for order in [Order::Joint, Order::Octants, Order::Random, Order::Simple] {
+    for order in [Order::Joint, Order::Ftob, Order::Random, Order::Simple] {
         let recipe = Recipe::fast().order(Order::Simple).width(Width::W8);
         let bvh = Bvh::build(&primitives, &recipe).expect("a tree");
         let log = order.log_kind().map(|kind| bvh.log_of(&rays, kind, 1));
@@ -62,13 +62,7 @@ fn logs_come_back_and_forged_ones_do_no_harm() {
     for width in Width::ALL {
         let recipe = Recipe::fast().order(Order::Simple).width(width);
         let bvh = Bvh::build(&primitives, &recipe).expect("a tree");
-        for order in [
-            Order::SortMinus,
-            Order::Sort,
-            Order::SortPlus,
-            Order::Joint,
-            Order::Octants,
-        ] {
+        for order in [Order::SortMinus, Order::Sort, Order::SortPlus, Order::Joint] {
             let kind = order.log_kind().expect("these learn");
             let log = bvh.log_of(&rays, kind, 1);
             let good = log.to_bytes();
