@@ -1,6 +1,5 @@
 //! Orders of the laboratory: what plans the rows of [`Order`] that only the feature `lab` has.
 
-use super::by_ray::ByRay;
 use super::{random, rtsah};
 use crate::order::Order;
 use crate::tree::costs::CostModel;
@@ -14,14 +13,12 @@ pub(crate) fn plan<const N: usize>(
     order: Order,
     model: &CostModel,
 ) -> SlotOrder {
-    let by_ray = |rule| SlotOrder {
-        pick: Rule::ByRay(rule),
-        ..SlotOrder::as_built(bvh.shape())
-    };
     match order {
         Order::Random => random::plan(bvh),
-        Order::Ftob => by_ray(ByRay::Distance),
-        Order::Far => by_ray(ByRay::Far),
+        Order::Ftob => SlotOrder {
+            pick: Rule::Distance,
+            ..SlotOrder::as_built(bvh.shape())
+        },
         Order::Rtsah => rtsah::plan(bvh, model),
         _ => SlotOrder::as_built(bvh.shape()),
     }

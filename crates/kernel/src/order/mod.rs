@@ -47,9 +47,6 @@ named_list! {
         Ftob if "lab" = "ftob",
             "Front to back by entry distance, decided for every ray",
             None, Properties { picks_by_ray: true, ..Properties::WITHOUT_LOG };
-        Far if "lab" = "far",
-            "Boxes that are left last come first, decided for every ray",
-            None, Properties { picks_by_ray: true, ..Properties::WITHOUT_LOG };
         Sato = "sato",
             "Larger surface area first",
             Some("Nah and Manocha 2014"), Properties::WITHOUT_LOG;

@@ -92,8 +92,7 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
                     lanes: mask.bits(),
                     width: N,
                 });
-                let hit = (mask, entry);
-                let (lanes, count) = pick.lanes::<N, NodeLanes<S, N>>(bvh, index, ray, hit);
+                let (lanes, count) = pick.lanes::<N, NodeLanes<S, N>>(bvh.pick, mask, entry);
                 for &lane in &lanes[..count] {
                     let slot = N as u32 - 1 - lane;
                     stack.push(Open {
