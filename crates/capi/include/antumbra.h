@@ -501,7 +501,7 @@ typedef struct antumbra_recipe {
     float prim_cost;
     float entry_cost;
     float cutout_cost;
-    /* Whether batches prefetch nodes: 1 or 0, or ANTUMBRA_AUTO. */
+    /* Whether batches prefetch nodes: 1 or 0, or ANTUMBRA_AUTO: by the size of the tree. */
     uint32_t prefetch;
     /* 0 */
     uint32_t reserved;

@@ -130,7 +130,7 @@ pub struct WidthsArgs {
 pub struct PrefetchArgs {
     /// Prefetching of nodes: auto, on, off
     ///
-    /// Leaves are prefetched, too. auto is what is faster on the training rays. Where nothing is learned, auto is on.
+    /// Leaves are prefetched, too. auto is on unless the tree fits the first cache of a CPU.
     #[arg(long, value_name = "P", default_value = "auto", help_heading = heading::TREE)]
     pub prefetch: PrefetchChoice,
 }

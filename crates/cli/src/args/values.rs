@@ -112,7 +112,7 @@ impl FromStr for Levels {
     }
 }
 
-/// Whether batches prefetch, or `None` for what is faster.
+/// Whether batches prefetch; `None`: by the size of the tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PrefetchChoice(pub Option<bool>);
 
@@ -483,7 +483,7 @@ mod tests {
     }
 
     #[test]
-    fn prefetching_is_timed_or_set() {
+    fn prefetching_is_by_size_or_set() {
         for (text, choice) in [("auto", None), ("on", Some(true)), ("off", Some(false))] {
             assert_eq!(text.parse(), Ok(PrefetchChoice(choice)));
         }

@@ -50,8 +50,8 @@ pub struct Bvh {
     pub(crate) dropped: usize,
     pub(crate) transparent: usize,
     pub(crate) pool: Pool,
-    /// Whether batches prefetch, see [`Bvh::prefetches`].
-    pub(crate) prefetch: bool,
+    /// What a recipe says of prefetching, see [`Bvh::prefetches`].
+    pub(crate) prefetch: Option<bool>,
     /// Fields of the [report](super::report::BuildReport).
     pub(crate) predicted_cost: Option<f64>,
     pub(crate) predicted_before: Option<f64>,
@@ -74,7 +74,7 @@ impl Bvh {
             dropped: primitives.dropped(),
             transparent: primitives.transparent(),
             pool: Pool::default(),
-            prefetch: true,
+            prefetch: None,
             predicted_cost: None,
             predicted_before: None,
             training_rays: 0,

@@ -170,7 +170,6 @@ impl Bvh {
         let log = self
             .learn_order(rays, None, recipe)
             .expect("the log is made here, of this tree and as the order needs it");
-        self.choose_prefetch(rays, recipe);
         log.map_or_else(
             ChildOrder::default,
             |log| on_tree!(&self.tree, tree => ChildOrder::of(tree, first, &log)),

@@ -144,7 +144,7 @@ impl Bvh {
         log
     }
 
-    /// Puts a tree fresh from its collapse into the order of a recipe, learned from `log` or else from `rays`. Where the
+    /// Puts a tree fresh from its collapse into the order of a recipe, and has it prefetch as the recipe says. Learned from `log` or else from `rays`. Where the
     /// order learns and there is neither, the tree stays as it is.
     ///
     /// The [report](Bvh::report) then has the number of rays learned from, and the predicted cost before and after.
@@ -159,6 +159,7 @@ impl Bvh {
         recipe: &Recipe,
     ) -> Result<Option<Log>, Error> {
         let Recipe { order, costs, .. } = recipe;
+        self.prefetch = recipe.prefetch.or(self.prefetch);
         if *order == Order::Simple {
             // A fresh tree is in this order.
             return Ok(None);

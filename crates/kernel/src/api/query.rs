@@ -252,7 +252,7 @@ impl Bvh {
                 batch,
                 pending,
                 answers,
-                prefetch: self.prefetch,
+                prefetch: self.prefetches(),
             });
         });
         memory.setups = setups;

@@ -40,8 +40,7 @@ pub struct Recipe {
     pub costs: CostModel,
     /// Which rays are learned from, how many surface rays are made, and the seed of learning.
     pub training: Training,
-    /// Whether batches prefetch nodes and leaves. With `None`, a short timing decides if there are training rays and a
-    /// [clock](Recipe::clock). Otherwise batches prefetch.
+    /// Whether batches prefetch nodes and leaves. With `None` they do unless the tree fits the first cache of a CPU.
     pub prefetch: Option<bool>,
     /// Clock by which the steps are timed for [`BuildReport`](crate::BuildReport); the kernel has none of its own.
     pub clock: Option<Clock>,
@@ -222,7 +221,7 @@ impl Recipe {
         self
     }
 
-    /// Sets whether batches prefetch. `None`, the default, times it on the training rays if there is a clock.
+    /// Sets whether batches prefetch. With `None`, the default, the size of the tree decides.
     pub fn prefetch(self, prefetch: Option<bool>) -> Self {
         Self { prefetch, ..self }
     }

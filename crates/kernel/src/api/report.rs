@@ -79,7 +79,7 @@ impl Bvh {
             predicted_cost: self.predicted_cost,
             predicted_cost_before: self.predicted_before,
             training_rays: self.training_rays,
-            prefetches: self.prefetch,
+            prefetches: self.prefetches(),
             times: self.times,
         })
     }

@@ -176,7 +176,7 @@ impl Bvh {
             dropped: dropped as usize,
             transparent: transparent as usize,
             pool: Pool::default(),
-            prefetch: prefetch != 0,
+            prefetch: (prefetch == 0).then_some(false),
             predicted_cost,
             predicted_before,
             training_rays,
@@ -197,7 +197,7 @@ impl Contents for Bvh {
 
     fn write_words(&self, sink: &mut Sink<'_>) {
         sink.word(self.width().lanes() as u32);
-        sink.word(self.prefetch.into());
+        sink.word((self.prefetch != Some(false)).into());
         for count in [self.cutouts, self.dropped, self.transparent] {
             sink.word(u32::try_from(count).unwrap_or(u32::MAX));
         }

@@ -1,7 +1,7 @@
 //! The stage between geometry and a tree that answers rays: a binary tree, and the log of training rays in it.
 //!
 //! The steps are always the same: binary tree, training log of the binary tree, collapse, training log of the wide
-//! tree, child order, prefetching. [`Build`](super::build::Build) takes them all. [`Stage`] stops in between for those
+//! tree, child order. [`Build`](super::build::Build) takes them all. [`Stage`] stops in between for those
 //! who make many trees from one binary tree.
 
 use alloc::borrow::Cow;
@@ -283,7 +283,6 @@ impl BinaryStage {
         bvh.learn_order(&training, None, &recipe.order(order))
             .expect("the log is made here, of this tree and as the order asks for");
         reached(0.95, monitor)?;
-        bvh.choose_prefetch(rays, recipe);
         monitor.progress(1.0);
         Ok(bvh)
     }

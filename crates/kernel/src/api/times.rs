@@ -40,8 +40,6 @@ pub struct BuildTimes {
     pub order: Duration,
     /// Predicting the mean cost of a ray before and after the order is applied.
     pub predict: Duration,
-    /// Timing batches with and without prefetching.
-    pub prefetch: Duration,
 }
 
 impl BuildTimes {
@@ -55,9 +53,8 @@ impl BuildTimes {
             order_log,
             order,
             predict,
-            prefetch,
         } = *self;
-        primitives + tree + log + collapse + order_log + order + predict + prefetch
+        primitives + tree + log + collapse + order_log + order + predict
     }
 }
 

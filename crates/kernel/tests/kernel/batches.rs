@@ -1,7 +1,7 @@
 //! Batches of every length, with rays that can hit nothing among them, give the answers of single queries, on
 //! one thread and on several.
 
-use antumbra::lab::Laboratory;
+use antumbra::recipe::Order;
 use antumbra::{Bvh, Hit, Isa, Ray, Recipe, Width};
 use antumbra_testkit::{Rng, mesh, rays};
 
@@ -35,6 +35,7 @@ fn tree(width: Width, isa: Isa) -> (Bvh, Vec<Ray>) {
 
 #[test]
 fn batches_of_every_length_equal_single_queries() {
+    let as_built = Recipe::default().order(Order::Simple);
     for width in Width::ALL {
         let (mut bvh, rays) = tree(width, Isa::best());
         let occluded: Vec<bool> = rays.iter().map(|ray| bvh.occluded(ray)).collect();
@@ -43,7 +44,8 @@ fn batches_of_every_length_equal_single_queries() {
         for isa in Isa::available() {
             bvh.set_isa(isa);
             for (turn, length) in LENGTHS.into_iter().enumerate() {
-                bvh.set_prefetch(turn % 2 == 0);
+                let prefetch = as_built.prefetch(Some(turn % 2 == 0));
+                bvh.relearn(&[], &prefetch);
                 let place = format!("x{width} {} {length} rays", isa.level());
                 let rays = &rays[..length];
                 // Answers of another batch must not shine through.

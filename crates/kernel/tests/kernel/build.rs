@@ -61,7 +61,6 @@ fn steps_are_timed_by_the_clock_of_the_caller() {
             times.order_log,
             times.order,
             times.predict,
-            times.prefetch,
         ];
         assert!(
             steps.iter().all(|step| *step >= second),

@@ -73,7 +73,7 @@ pub struct Options {
     pub builds: Vec<Builder>,
     /// Whether to measure what there is beside plain triangles, on one thread: quads, user geometry, conditions, refits, points.
     pub kinds: bool,
-    /// Whether batches prefetch nodes and leaves; `None` is what is faster on the training rays.
+    /// Whether batches prefetch nodes and leaves; `None` is by the size of the tree.
     pub prefetch: Option<bool>,
     /// Instruction sets, of Embree too. At least one.
     pub isas: Vec<Isa>,

@@ -41,7 +41,7 @@ impl Ingredients {
         }
     }
 
-    /// Collapses the tree, has it learn if its order learns, and tries whether to prefetch.
+    /// Collapses the tree, and has it learn if its order learns.
     pub fn tree(
         &self,
         width: Width,
@@ -58,7 +58,6 @@ impl Ingredients {
         let log = collapse.needs_log().then_some(&self.log);
         let mut bvh = self.stage.collapse_for(log, true, &recipe);
         bvh.learn_order(&self.training, None, &recipe)?;
-        bvh.choose_prefetch(&self.training, &recipe);
         let label = TreeLabel {
             builder: recipe.builder.name(),
             collapse: collapse.name(),

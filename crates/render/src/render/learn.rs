@@ -7,7 +7,6 @@
 //! 3. *Final tree.* A learned collapse, and a builder that needs rays, learn from surface rays and training rays.
 //!    Training rays count for half or more. Surface rays stand for the parts that the camera does not see.
 //! 4. *Child order.* The order learns from a log of the training rays in the final tree.
-//! 5. *Prefetch.* A short timing of the training rays decides whether the final tree prefetches.
 
 use std::time::{Duration, Instant};
 
@@ -53,7 +52,7 @@ pub struct LearningFigures {
     pub following: Duration,
     /// Time of building the binary tree from scratch.
     pub rebuilding: Duration,
-    /// Time of the second collapse, of planning and applying the order, and of trying whether to prefetch.
+    /// Time of the second collapse, and of planning and applying the order.
     pub sorting: Duration,
     /// Part of `sorting` that plans and applies the order.
     pub ordering: Duration,
@@ -197,7 +196,6 @@ pub fn learn_order(
     made_anew: bool,
 ) -> Result<LearningFigures, Error> {
     bvh.learn_order(rays, log, recipe).map_err(Error::Order)?;
-    bvh.choose_prefetch(rays, recipe);
     Ok(LearningFigures::of(recipe, bvh, made_anew))
 }
 
@@ -258,7 +256,7 @@ impl LearningFigures {
             predicting: times.predict,
             following: times.order_log,
             rebuilding: Duration::ZERO,
-            sorting: times.order + times.prefetch,
+            sorting: times.order,
             ordering: times.order,
         };
         if made_anew {

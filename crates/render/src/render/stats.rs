@@ -51,8 +51,7 @@ pub struct Stats {
     /// Time of the pre-pass. With a learned collapse, also of following the training rays through the binary tree
     /// and through the final one.
     pub log_seconds: f64,
-    /// Time of ordering the tree and of trying whether to prefetch. With a learned collapse, also of collapsing it
-    /// again.
+    /// Time of ordering the tree. With a learned collapse, also of collapsing it again.
     pub sort_seconds: f64,
     /// Part of `sort_seconds` that plans and applies the order, on one thread.
     pub order_seconds: f64,
