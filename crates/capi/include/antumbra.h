@@ -485,7 +485,7 @@ typedef struct antumbra_recipe {
     const char *collapse;
     /* In which order occlusion rays visit children: "joint", "sort+", "sort", "sort-", "visits", "sato", "embree", "simple". */
     const char *order;
-    /* Instruction set of queries: "avx512", "avx2", "sse41", "neon", "scalar". NULL: the best one of this CPU. */
+    /* Instruction set of queries: "avx512", "avx2", "neon", "scalar". NULL: the best one of this CPU. */
     const char *level;
     /* Children per node: 4, 8 or 16; 0 for what suits the instruction set. */
     uint32_t width;

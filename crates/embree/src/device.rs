@@ -174,7 +174,7 @@ impl Settings {
 fn isa(name: &str) -> Outcome<Isa> {
     let level = match name.to_ascii_lowercase().as_str() {
         "sse" | "sse2" | "sse3" | "ssse3" | "sse41" | "sse4.1" | "sse42" | "sse4.2" | "avx"
-        | "avxi" => Level::Sse41,
+        | "avxi" => Level::Scalar,
         "avx2" => Level::Avx2,
         "avx512" | "avx512skx" | "avx512knl" => Level::Avx512,
         "neon" | "neon2x" => return Ok(Isa::best()),

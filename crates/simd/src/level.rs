@@ -11,7 +11,6 @@ named_list! {
     #[derive(PartialOrd, Ord)]
     pub enum Level("level"): () {
         Scalar = "scalar", "Plain Rust, on every CPU: the reference for the other levels", None, ();
-        Sse41 = "sse41", "x86-64 with SSE4.1: 4 lanes", None, ();
         Avx2 = "avx2", "x86-64 with AVX2, FMA, BMI1 and BMI2: 8 lanes", None, ();
         Avx512 = "avx512", "x86-64 with AVX-512 F, VL, BW and DQ: 16 lanes", None, ();
         Neon = "neon", "AArch64 Advanced SIMD: 4 lanes", None, ();
@@ -37,8 +36,6 @@ impl Level {
     pub fn is_available(self) -> bool {
         match self {
             Self::Scalar => true,
-            #[cfg(target_arch = "x86_64")]
-            Self::Sse41 => has!("sse4.1"),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => has!("avx2", "fma", "bmi1", "bmi2", "lzcnt", "popcnt"),
             #[cfg(target_arch = "x86_64")]
@@ -217,9 +214,6 @@ macro_rules! dispatch {
     // Runs `op` on a level with vectors and wraps what it returns; `else` for the scalar level.
     (@ $n:literal, $level:expr, $op:ident, $wrap:expr, else $scalar:expr) => {
         match $level {
-            #[cfg(target_arch = "x86_64")]
-            // SAFETY: an `Isa` is only made for a level that `is_available`.
-            Level::Sse41 => $wrap(unsafe { arch::sse41::run::<$n, Op>($op) }),
             #[cfg(target_arch = "x86_64")]
             // SAFETY: an `Isa` is only made for a level that `is_available`.
             Level::Avx2 => $wrap(unsafe { arch::avx2::run::<$n, Op>($op) }),

@@ -457,7 +457,7 @@ mod tests {
         for bad in ["", "0", "2,2", "1025", "-1", "many", "all,all"] {
             assert!(bad.parse::<ThreadCounts>().is_err(), "{bad}");
         }
-        for bad in ["", "mmx", "auto,auto", "avx2;sse41"] {
+        for bad in ["", "mmx", "auto,auto", "avx2;scalar"] {
             assert!(bad.parse::<Levels>().is_err(), "{bad}");
         }
         let threads = [NonZeroUsize::new(3), None, NonZeroUsize::new(1)];

@@ -354,7 +354,7 @@ fn embree_stands_beside_us() {
         "--json",
         "-",
     ];
-    let levels = ["avx512", "avx2", "sse41"].map(|name| name.parse().expect("a level"));
+    let levels = ["avx512", "avx2"].map(|name| name.parse().expect("a level"));
     let levels = levels
         .into_iter()
         .filter(|level: &Level| level.is_available());

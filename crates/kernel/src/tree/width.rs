@@ -31,12 +31,11 @@ impl Width {
         Self::ALL.into_iter().find(|width| width.lanes() == lanes)
     }
 
-    /// Default width for a level: as wide as its registers, twice that on SSE4.1, where fewer visits more than make
-    /// up for two steps per node.
+    /// Default width for a level: as wide as its registers.
     pub fn auto(level: Level) -> Self {
         match level {
             Level::Avx512 => Self::W16,
-            Level::Avx2 | Level::Sse41 => Self::W8,
+            Level::Avx2 => Self::W8,
             _ => Self::W4,
         }
     }

@@ -124,7 +124,130 @@ where
     op.with_simd(Avx2(()))
 }
 
-x86_xmm_lanes!(Avx2, _mm_fmsub_ps);
+/// Vector of 4 floats.
+#[derive(Clone, Copy)]
+pub struct F32x4(__m128);
+
+x86_xmm_doubles!();
+
+x86_operators!(F32x4, _mm_add_ps, _mm_sub_ps, _mm_mul_ps, _mm_div_ps);
+
+impl Lanes<4> for F32x4 {
+    type Token = Avx2;
+    type Mask = Mask4;
+    type Double = Pair<F64x2>;
+
+    #[inline(always)]
+    fn splat(_: Avx2, x: f32) -> Self {
+        // SAFETY: the token proves the CPU has the instruction.
+        Self(unsafe { _mm_set1_ps(x) })
+    }
+    #[inline(always)]
+    fn load(_: Avx2, values: &[f32; 4]) -> Self {
+        // SAFETY: as for `splat`; four floats are readable, and `loadu` needs no alignment.
+        Self(unsafe { _mm_loadu_ps(values.as_ptr()) })
+    }
+    #[inline(always)]
+    fn store(self, out: &mut [f32; 4]) {
+        // SAFETY: as for `load`; four floats are writable.
+        unsafe { _mm_storeu_ps(out.as_mut_ptr(), self.0) }
+    }
+    #[inline(always)]
+    fn mul_sub(self, b: Self, c: Self) -> Self {
+        // SAFETY: `self` came from the token.
+        Self(unsafe { _mm_fmsub_ps(self.0, b.0, c.0) })
+    }
+    x86_xmm_conversions!();
+    #[inline(always)]
+    fn min(self, b: Self) -> Self {
+        // SAFETY: `self` came from the token.
+        Self(unsafe { _mm_min_ps(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn max(self, b: Self) -> Self {
+        // SAFETY: `self` came from the token.
+        Self(unsafe { _mm_max_ps(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn copysign(self, sign: Self) -> Self {
+        // SAFETY: `self` came from the token.
+        Self(unsafe {
+            let bit = _mm_set1_ps(-0.0);
+            _mm_or_ps(_mm_and_ps(bit, sign.0), _mm_andnot_ps(bit, self.0))
+        })
+    }
+    #[inline(always)]
+    fn flip_sign(self, by: Self) -> Self {
+        // SAFETY: `self` came from the token.
+        Self(unsafe { _mm_xor_ps(self.0, _mm_and_ps(_mm_set1_ps(-0.0), by.0)) })
+    }
+    #[inline(always)]
+    fn select(mask: Mask4, yes: Self, no: Self) -> Self {
+        // SAFETY: `yes` came from the token.
+        Self(unsafe { _mm_blendv_ps(no.0, yes.0, mask.0) })
+    }
+    #[inline(always)]
+    fn lt(self, b: Self) -> Mask4 {
+        // SAFETY: `self` came from the token.
+        Mask4(unsafe { _mm_cmplt_ps(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn le(self, b: Self) -> Mask4 {
+        // SAFETY: `self` came from the token.
+        Mask4(unsafe { _mm_cmple_ps(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn eq(self, b: Self) -> Mask4 {
+        // SAFETY: `self` came from the token.
+        Mask4(unsafe { _mm_cmpeq_ps(self.0, b.0) })
+    }
+    #[inline(always)]
+    fn words_at_least(_: Avx2, words: &[u32; 4], least: u32) -> Mask4 {
+        // SAFETY: the token proves the CPU has the instructions; four words are readable.
+        Mask4(unsafe {
+            let words = _mm_loadu_si128(words.as_ptr().cast());
+            let more = _mm_max_epu32(words, _mm_set1_epi32(least as i32));
+            _mm_castsi128_ps(_mm_cmpeq_epi32(words, more))
+        })
+    }
+}
+
+/// Mask of 4 lanes; all bits of a lane are equal.
+#[derive(Clone, Copy)]
+pub struct Mask4(__m128);
+
+x86_register_mask!(
+    Mask4,
+    _mm_and_ps,
+    _mm_or_ps,
+    _mm_andnot_ps,
+    _mm_castsi128_ps(_mm_set1_epi32(-1))
+);
+
+impl Mask<4> for Mask4 {
+    #[inline(always)]
+    fn bits(self) -> u32 {
+        // SAFETY: `self` came from a comparison, which came from the token.
+        unsafe { _mm_movemask_ps(self.0) as u32 }
+    }
+    #[inline(always)]
+    fn any(self) -> bool {
+        self.bits() != 0
+    }
+    #[inline(always)]
+    fn compress(self, values: &[u32; 4], out: &mut [u32; 4]) -> usize {
+        let bits = self.bits();
+        let shuffle = &super::x86::COMPRESS_4[(bits & 15) as usize];
+        // SAFETY: as for `bits` (SSSE3 is part of AVX2); 16 bytes are readable at `shuffle`
+        // and `values` and writable at `out`.
+        unsafe {
+            let shuffle = _mm_loadu_si128(shuffle.as_ptr().cast());
+            let values = _mm_loadu_si128(values.as_ptr().cast());
+            _mm_storeu_si128(out.as_mut_ptr().cast(), _mm_shuffle_epi8(values, shuffle));
+        }
+        bits.count_ones() as usize
+    }
+}
 
 /// Vector of 8 floats.
 #[derive(Clone, Copy)]

@@ -1,7 +1,7 @@
 //! One file per instruction set.
 //!
 //! - `scalar`: plain arrays, the reference for all other files
-//! - `sse41`, `avx2`, `avx512`: x86-64; `x86` holds the code and tables they share
+//! - `avx2`, `avx512`: x86-64; `x86` holds the code and tables they share
 //! - `neon`: AArch64
 //! - `simd128`: WebAssembly
 //! - `pair`: a vector made of two narrower ones, for widths that the CPU has no register for
@@ -21,8 +21,6 @@ mod x86;
 pub(crate) mod avx2;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod avx512;
-#[cfg(target_arch = "x86_64")]
-pub(crate) mod sse41;
 
 #[cfg(target_arch = "aarch64")]
 pub(crate) mod neon;

@@ -197,7 +197,6 @@ pub fn isa(level: Level) -> Option<&'static str> {
     match level {
         Level::Avx512 => Some("avx512"),
         Level::Avx2 => Some("avx2"),
-        Level::Sse41 => Some("sse4.2"),
         // Embree has no scalar kernels, and on Arm no choice that could be checked.
         _ => None,
     }
