@@ -13,7 +13,7 @@ use crate::geometry::masks::SceneMasks;
 use crate::geometry::primitives::Primitives;
 use crate::shape::Shape;
 use crate::trace::memory::Pool;
-use crate::tree::any::{Tree, on_tree};
+use crate::tree::wide::Tree;
 use crate::tree::width::Width;
 
 /// A bounding volume hierarchy that answers occlusion and closest-hit queries.
@@ -92,11 +92,7 @@ impl Bvh {
     /// Largest number of children of a node: 4, 8 or 16.
     #[must_use]
     pub fn width(&self) -> Width {
-        match &self.tree {
-            Tree::W4(_) => Width::W4,
-            Tree::W8(_) => Width::W8,
-            Tree::W16(_) => Width::W16,
-        }
+        self.tree.width()
     }
 
     /// The instruction set that queries run on.
@@ -113,7 +109,7 @@ impl Bvh {
     /// The smallest box around everything; empty for an empty scene.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
-        on_tree!(&self.tree, tree => tree.bounds)
+        self.tree.bounds
     }
 
     /// Checks every promise of the tree that traversal relies on; for tests and bug reports.
@@ -121,7 +117,7 @@ impl Bvh {
     /// # Errors
     /// The first broken promise, in words.
     pub fn validate(&self) -> Result<(), String> {
-        let found = on_tree!(&self.tree, tree => tree.validate())?;
+        let found = self.tree.validate()?;
         if found == self.primitives {
             Ok(())
         } else {
@@ -133,7 +129,7 @@ impl Bvh {
     }
 
     pub(crate) fn shape(&self) -> Shape {
-        on_tree!(&self.tree, tree => tree.shape())
+        self.tree.shape()
     }
 }
 

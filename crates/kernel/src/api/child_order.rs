@@ -5,10 +5,10 @@ use alloc::vec::Vec;
 use super::bvh::Bvh;
 use super::recipe::Recipe;
 use crate::learn::Log;
+use crate::order::AS_THEY_ARE;
 use crate::ray::Ray;
-use crate::tree::any::on_tree;
 use crate::tree::node::{Child, ChildKind};
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 
 /// Nodes that fewer than one of this many rays visited are left out: they are many, and save next to nothing.
 const RARE: u64 = 256;
@@ -45,9 +45,9 @@ pub struct ChildOrder {
 
 impl ChildOrder {
     /// The order of a tree from a node on, at the nodes that rays of a log visited.
-    fn of<const N: usize>(tree: &WideTree<N>, first: usize, log: &Log) -> Self {
+    fn of(tree: &Tree, first: usize, log: &Log) -> Self {
         let mut order = Self {
-            width: N,
+            width: tree.width().lanes(),
             ..Self::default()
         };
         let is_known = log.kind().boxes;
@@ -55,7 +55,7 @@ impl ChildOrder {
             let visits = u64::from(log.node_entered(index));
             if node.len() > 1 && (!is_known || visits * RARE >= log.rays().max(1)) {
                 order.nodes.push((index - first) as u32);
-                let children = (0..N).map(|slot| from_here(node.child(slot), index));
+                let children = (0..node.width()).map(|slot| from_here(node.child(slot), index));
                 order.children.extend(children);
             }
         }
@@ -63,28 +63,30 @@ impl ChildOrder {
     }
 
     /// Puts the children of the nodes of a tree in this order, where they are the same.
-    fn apply<const N: usize>(&self, tree: &mut WideTree<N>, first: usize) {
-        if self.width != N {
+    fn apply(&self, tree: &mut Tree, first: usize) {
+        let width = tree.width().lanes();
+        if self.width != width {
             return;
         }
-        for (node, children) in self.nodes.iter().zip(self.children.chunks_exact(N)) {
+        for (node, children) in self.nodes.iter().zip(self.children.chunks_exact(width)) {
             let index = first + *node as usize;
-            let Some(node) = tree.nodes.get_mut(index) else {
+            if index >= tree.nodes.len() {
                 return;
-            };
-            let mut slots = [0; N];
+            }
+            let mut node = tree.nodes.get_mut(index);
+            let mut slots = AS_THEY_ARE;
             let mut found = 0_u32;
             for (slot, child) in children.iter().enumerate() {
-                let is_it = |old: &usize| from_here(node.child(*old), index) == *child;
+                let is_it = |old: &usize| from_here(node.any().child(*old), index) == *child;
                 // Empty slots are alike.
                 let is_free = |old: &usize| found >> old & 1 == 0;
-                if let Some(old) = (0..N).find(|old| is_free(old) && is_it(old)) {
+                if let Some(old) = (0..width).find(|old| is_free(old) && is_it(old)) {
                     slots[slot] = old as u8;
                     found |= 1 << old;
                 }
             }
-            if found.count_ones() as usize == N {
-                node.permute(&slots);
+            if found.count_ones() as usize == width {
+                node.permute(&slots[..width]);
             }
         }
     }
@@ -170,15 +172,15 @@ impl Bvh {
         let log = self
             .learn_order(rays, None, recipe)
             .expect("the log is made here, of this tree and as the order needs it");
-        log.map_or_else(
-            ChildOrder::default,
-            |log| on_tree!(&self.tree, tree => ChildOrder::of(tree, first, &log)),
-        )
+        self.choose_prefetch(rays, recipe);
+        log.map_or_else(ChildOrder::default, |log| {
+            ChildOrder::of(&self.tree, first, &log)
+        })
     }
 
     /// [`Bvh::adopt`], for an order whose nodes are counted from `first`.
     pub(super) fn adopt_from(&mut self, first: usize, order: &ChildOrder) {
-        on_tree!(&mut self.tree, tree => order.apply(tree, first));
+        order.apply(&mut self.tree, first);
     }
 }
 

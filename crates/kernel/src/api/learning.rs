@@ -14,7 +14,6 @@ use crate::learn::{Log, LogKind, TreeLog};
 use crate::order::{self, Order};
 use crate::ray::Ray;
 use crate::trace::observe::Cost;
-use crate::tree::any::{Tree, on_tree};
 use crate::tree::binary::BinaryTree;
 use crate::tree::costs::CostModel;
 use crate::tree::slot_order::SlotOrder;
@@ -35,11 +34,7 @@ impl Bvh {
     ) -> Self {
         tree.assert_is_of(primitives);
         if collapse == Collapse::Area {
-            let tree = match width {
-                Width::W4 => Tree::W4(collapse::by_area(primitives, tree)),
-                Width::W8 => Tree::W8(collapse::by_area(primitives, tree)),
-                Width::W16 => Tree::W16(collapse::by_area(primitives, tree)),
-            };
+            let tree = collapse::by_area(primitives, tree, width);
             return Self::fresh(tree, isa, primitives);
         }
         let learning = Learning {
@@ -68,20 +63,7 @@ impl Bvh {
     ) -> Self {
         tree.assert_is_of(primitives);
         log.assert_fits(tree);
-        let (tree, cost) = match width {
-            Width::W4 => {
-                let (tree, cost) = collapse::by_log(primitives, tree, log, learning);
-                (Tree::W4(tree), cost)
-            }
-            Width::W8 => {
-                let (tree, cost) = collapse::by_log(primitives, tree, log, learning);
-                (Tree::W8(tree), cost)
-            }
-            Width::W16 => {
-                let (tree, cost) = collapse::by_log(primitives, tree, log, learning);
-                (Tree::W16(tree), cost)
-            }
-        };
+        let (tree, cost) = collapse::by_log(primitives, tree, log, learning, width);
         Self {
             predicted_cost: Some(cost),
             ..Self::fresh(tree, isa, primitives)
@@ -90,7 +72,7 @@ impl Bvh {
 
     /// Empty log for this tree. `seed` starts the shuffling, if the kind shuffles.
     pub(crate) fn new_log(&self, kind: LogKind, seed: u64) -> Log {
-        on_tree!(&self.tree, tree => Log::new(tree, kind, seed))
+        Log::new(&self.tree, kind, seed)
     }
 
     /// Computes an order for a tree fresh from a collapse. [`Order::Simple`] leaves the tree as it is: in the
@@ -105,7 +87,7 @@ impl Bvh {
         log: Option<&Log>,
         model: &CostModel,
     ) -> Result<SlotOrder, Error> {
-        on_tree!(&self.tree, tree => order::plan(tree, order, log, model))
+        order::plan(&self.tree, order, log, model)
     }
 
     /// Mean cost of an occlusion query by the paper's equation (1), `C_any` of the root, with chances estimated from
@@ -119,7 +101,7 @@ impl Bvh {
         model: &CostModel,
         order: Option<&SlotOrder>,
     ) -> Result<f64, Error> {
-        on_tree!(&self.tree, tree => order::ratio::predicted_cost(tree, log, model, order))
+        order::ratio::predicted_cost(&self.tree, log, model, order)
     }
 
     /// Puts children and primitives where `order` wants them. A log made before counts the old slots and is of no
@@ -131,7 +113,7 @@ impl Bvh {
         if let Err(error) = Error::unless_fits(order.shape, self.shape()) {
             panic!("{error}");
         }
-        on_tree!(&mut self.tree, tree => tree.apply(order));
+        self.tree.apply(order);
         self.predicted_cost = None;
     }
 

@@ -113,9 +113,7 @@ impl MovingBvh {
         }
         let mut spans = Vec::with_capacity(trees.len());
         for (mut bvh, keys) in trees.into_iter().zip(&motion.spans) {
-            on_tree!(&mut bvh.tree, tree => {
-                tree.set_motion(keys)?;
-            });
+            bvh.tree.set_motion(keys)?;
             spans.push(bvh);
         }
         Ok(Self { spans })
@@ -184,7 +182,7 @@ impl MovingBvh {
     pub fn validate(&self) -> Result<(), alloc::string::String> {
         self.spans
             .iter()
-            .try_for_each(|bvh| on_tree!(&bvh.tree, tree => tree.check_motion()))
+            .try_for_each(|bvh| bvh.tree.check_motion())
     }
 
     #[inline(always)]

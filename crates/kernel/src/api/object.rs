@@ -10,7 +10,6 @@ use crate::error::Error;
 use crate::geometry::instance::ObjectShape;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::{Functions, Geometry};
-use crate::tree::any::on_tree;
 use crate::tree::words::{Kind, Sink, Words};
 
 /// Geometry with its tree, built once and placed in any number of [worlds](crate::World), any number of times.
@@ -60,9 +59,8 @@ impl Object {
     /// As [`Bvh::refit`].
     pub fn refit(&mut self, geometries: &[Geometry<'_>]) -> Result<(), Error> {
         self.bvh.refit(geometries)?;
-        self.shape = on_tree!(&self.bvh.tree, tree => {
-            ObjectShape::around(&tree.bounds, tree.prim_bounds(&tree.all_places()))
-        });
+        let tree = &self.bvh.tree;
+        self.shape = ObjectShape::around(&tree.bounds, tree.prim_bounds(&tree.all_places()));
         Ok(())
     }
 
@@ -90,7 +88,7 @@ impl Contents for Object {
 
     fn read_words(words: &mut Words<'_>, functions: &Functions) -> Result<Self, Error> {
         let bvh = Bvh::read_words(words, functions)?;
-        if on_tree!(&bvh.tree, tree => !tree.roots.is_empty()) {
+        if !bvh.tree.roots.is_empty() {
             return Err(words.error("an object has instances"));
         }
         let shape = ObjectShape::read(words, bvh.bounds().reach())?;

@@ -273,14 +273,14 @@ impl Bvh {
     }
 
     pub(crate) fn counting<'a>(&self, costs: &'a mut [Cost]) -> Counting<'a> {
-        Counting::new(costs, on_tree!(&self.tree, tree => tree.top_nodes()))
+        Counting::new(costs, self.tree.top_nodes())
     }
 
     pub(super) fn rule(&self) -> &Rule {
-        on_tree!(&self.tree, tree => &tree.pick)
+        &self.tree.pick
     }
 
     pub(super) fn depth(&self) -> usize {
-        on_tree!(&self.tree, tree => tree.depth)
+        self.tree.depth
     }
 }

@@ -10,7 +10,6 @@ use crate::geometry::QueryKind;
 use crate::ray_columns::Rays;
 use crate::trace::ray_batch::RayBatch;
 use crate::trace::ray_sort::Grid;
-use crate::tree::any::on_tree;
 
 /// Order in which the rays of a batch are traced. Answers, and their places, are the same.
 ///
@@ -81,7 +80,7 @@ impl RayOrder {
                 query == QueryKind::Intersect
                     && rays.len() >= WORTHWHILE
                     && piece_len(rays.len(), threads) >= WORTHWHILE
-                    && on_tree!(&bvh.tree, tree => tree.bytes()) >= LARGE_TREE
+                    && bvh.tree.bytes() >= LARGE_TREE
                     && are_scattered(rays, bvh)
                     && hit_much(rays, bvh)
             }

@@ -4,7 +4,6 @@ use super::bvh::Bvh;
 use crate::error::Error;
 use crate::geometry::Geometry;
 use crate::geometry::moved::Moved;
-use crate::tree::any::on_tree;
 use crate::tree::costs::CostModel;
 
 impl Bvh {
@@ -40,18 +39,17 @@ impl Bvh {
     ///   [`Error::PrimitiveIsGone`],
     /// - the tree has instances: [`Error::HasInstances`]; a [`World`](crate::World) refits its objects.
     pub fn refit(&mut self, geometries: &[Geometry<'_>]) -> Result<(), Error> {
-        if on_tree!(&self.tree, tree => !tree.roots.is_empty()) {
+        if !self.tree.roots.is_empty() {
             return Err(Error::HasInstances);
         }
         let moved = Moved::new(geometries, self.primitives + self.transparent)?;
         let sah = self.built_sah();
-        on_tree!(&mut self.tree, tree => {
-            let places = tree.all_places();
-            tree.check_moved(&places, &moved)?;
-            tree.refit(&[(places, moved)]);
-            tree.bounds = tree.nodes[0].all_bounds();
-            tree.reach = tree.bounds.reach();
-        });
+        let tree = &mut self.tree;
+        let places = tree.all_places();
+        tree.check_moved(&places, &moved)?;
+        tree.refit(&[(places, moved)]);
+        tree.bounds = tree.nodes.get(0).all_bounds();
+        tree.reach = tree.bounds.reach();
         self.built_sah = Some(sah);
         // Predicted for what was there before.
         self.predicted_cost = None;
@@ -75,6 +73,6 @@ impl Bvh {
     }
 
     fn sah(&self) -> f64 {
-        on_tree!(&self.tree, tree => tree.sah(&CostModel::default()))
+        self.tree.sah(&CostModel::default())
     }
 }

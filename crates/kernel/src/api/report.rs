@@ -2,7 +2,6 @@
 
 use super::bvh::Bvh;
 use super::times::BuildTimes;
-use crate::tree::any::on_tree;
 use crate::tree::costs::CostModel;
 
 /// Size, cost and build times of a tree, returned by [`Bvh::report`].
@@ -63,7 +62,8 @@ impl Bvh {
     /// Returns size, cost and build times of this tree.
     #[must_use]
     pub fn report(&self) -> BuildReport {
-        on_tree!(&self.tree, tree => BuildReport {
+        let tree = &self.tree;
+        BuildReport {
             primitives: self.primitives,
             cutouts: self.cutouts,
             instances: tree.instances.len(),
@@ -81,6 +81,6 @@ impl Bvh {
             training_rays: self.training_rays,
             prefetches: self.prefetches(),
             times: self.times,
-        })
+        }
     }
 }

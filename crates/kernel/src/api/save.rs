@@ -13,9 +13,9 @@ use super::world::World;
 use crate::error::Error;
 use crate::geometry::Functions;
 use crate::trace::memory::Pool;
-use crate::tree::any::{Tree, on_tree};
 use crate::tree::validate::Walked;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
+use crate::tree::width::Width;
 use crate::tree::words::{self, Kind, Sink, Words};
 
 /// What a file can hold: a [`Bvh`], an [`Object`] or a [`World`]. [`Functions::read`] returns any of them.
@@ -55,7 +55,7 @@ fn write(saved: &impl Contents, out: impl Write) -> Result<(), Error> {
 }
 
 fn to_bytes(saved: &impl Contents) -> Vec<u8> {
-    let most = on_tree!(&saved.tree().tree, tree => tree.file_bytes());
+    let most = saved.tree().tree.file_bytes();
     words::to_bytes(kind_of(saved), most, |sink| saved.write_words(sink))
 }
 
@@ -154,20 +154,11 @@ impl Bvh {
         let training_rays = words.long()?;
         let [predicted_cost, predicted_before, built_sah] =
             [words.double()?, words.double()?, words.double()?];
-        macro_rules! read {
-            ($variant:ident) => {{
-                let (tree, walked) = WideTree::read(words, functions)?;
-                let primitives = tree.count_primitives(&walked);
-                let primitives = primitives.map_err(|broken| words.error(broken))?;
-                (Tree::$variant(tree), walked, primitives)
-            }};
-        }
-        let (tree, walked, primitives) = match width {
-            4 => read!(W4),
-            8 => read!(W8),
-            16 => read!(W16),
-            _ => return Err(words.error(format!("no node has {width} children"))),
-        };
+        let width = Width::from_lanes(width as usize)
+            .ok_or_else(|| words.error(format!("no node has {width} children")))?;
+        let (tree, walked) = Tree::read(words, width, functions)?;
+        let primitives = tree.count_primitives(&walked);
+        let primitives = primitives.map_err(|broken| words.error(broken))?;
         let bvh = Self {
             tree,
             isa: Isa::best(),
@@ -205,7 +196,7 @@ impl Contents for Bvh {
         for cost in [self.predicted_cost, self.predicted_before, self.built_sah] {
             sink.double(cost);
         }
-        on_tree!(&self.tree, tree => tree.write(sink));
+        self.tree.write(sink);
     }
 
     fn read_words(words: &mut Words<'_>, functions: &Functions) -> Result<Self, Error> {

@@ -93,9 +93,7 @@ impl Bvh {
         match located.instance {
             None => unit(&normal, None),
             Some(index) => {
-                let columns = on_tree!(&self.tree, tree => {
-                    tree.instances[index].placement.object_from_world
-                });
+                let columns = self.tree.instances[index].placement.object_from_world;
                 unit(&normal, Some(&columns))
             }
         }
@@ -189,7 +187,7 @@ mod tests {
         let geometries = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
         let bvh = Bvh::build(&geometries, &Recipe::default()).expect("in range");
         let mut deep = bvh.clone();
-        on_tree!(&mut deep.tree, tree => tree.depth = 10_000);
+        deep.tree.depth = 10_000;
         for _ in 0..500 {
             let ray = Ray::between(rng.point(1.0), rng.point(1.0));
             assert_eq!(deep.occluded(&ray), bvh.occluded(&ray));

@@ -12,7 +12,9 @@ use crate::aabb::Aabb;
 use crate::builder::binned_sah::Part;
 use crate::builder::binned_sah::items::Items;
 use crate::builder::cost::ItemWeights;
-use crate::tree::node::{Child, ChildKind, Node};
+use crate::tree::node::{Child, ChildKind};
+use crate::tree::nodes::Nodes;
+use crate::tree::width::Width;
 
 pub(crate) use crate::builder::cost::instance_weight;
 pub(crate) use crate::builder::subtrees::take_apart;
@@ -49,9 +51,9 @@ impl TopItem {
 
 /// Nodes over items.
 #[derive(Debug)]
-pub(crate) struct TopLevel<const N: usize> {
+pub(crate) struct TopLevel {
     /// In depth-first order; the first is the root and always there.
-    pub nodes: Vec<Node<N>>,
+    pub nodes: Nodes,
     /// The instances in the order in which the nodes refer to them.
     pub instances: Vec<u32>,
     /// Levels of nodes, the root being one.
@@ -60,15 +62,15 @@ pub(crate) struct TopLevel<const N: usize> {
     pub bounds: Aabb,
 }
 
-impl<const N: usize> TopLevel<N> {
-    /// Builds nodes over items. Without items there is an empty root. `ranks` are the places of the items in an order that was
+impl TopLevel {
+    /// Builds nodes of a width over items. Without items there is an empty root. `ranks` are the places of the items in an order that was
     /// learned; empty if nothing was.
-    pub fn new(items: &[TopItem], ranks: &[u32]) -> Self {
+    pub fn new(items: &[TopItem], ranks: &[u32], width: Width) -> Self {
         let weights = ItemWeights(items.iter().map(|item| item.weight).collect());
         let mut parts = Items::new(items.iter().map(|item| item.bounds), &weights);
         let root = parts.all();
         let mut top = Self {
-            nodes: Vec::with_capacity(1 + items.len() / 2),
+            nodes: Nodes::with_capacity(width, 1 + items.len() / 2),
             instances: Vec::with_capacity(items.len()),
             depth: 1,
             bounds: root.bounds(),
@@ -93,8 +95,9 @@ impl<const N: usize> TopLevel<N> {
     ) -> usize {
         self.depth = self.depth.max(level);
         let place = self.nodes.len();
-        self.nodes.push(Node::EMPTY);
-        for (slot, part) in children::<N>(parts, part, ranks).into_iter().enumerate() {
+        self.nodes.push_empty();
+        let width = self.nodes.width().lanes();
+        for (slot, part) in children(parts, part, ranks, width).into_iter().enumerate() {
             let child = match parts.only(&part).map(|item| items[item].child) {
                 Some(TopChild::Subtree(child)) => child,
                 Some(TopChild::Instance(index)) => {
@@ -103,27 +106,27 @@ impl<const N: usize> TopLevel<N> {
                 }
                 None => Child::inner(self.add_node((items, ranks), parts, part, level + 1)),
             };
-            self.nodes[place].set(slot, child, &part.bounds());
+            self.nodes.get_mut(place).set(slot, child, &part.bounds());
         }
         place
     }
 }
 
 /// Divides a part into the children of a node: the lowest ranks first, and among equal ranks the largest box.
-fn children<const N: usize>(items: &mut Items<'_>, part: Part, ranks: &[u32]) -> Vec<Part> {
-    let mut parts = Vec::with_capacity(N);
+fn children(items: &mut Items<'_>, part: Part, ranks: &[u32], width: usize) -> Vec<Part> {
+    let mut parts = Vec::with_capacity(width);
     if part.len() > 0 {
         parts.push(part);
     }
-    while parts.len() < N
-        && let Some(large) = largest(&parts, N + 1..usize::MAX)
+    while parts.len() < width
+        && let Some(large) = largest(&parts, width + 1..usize::MAX)
     {
         let [left, right] = items.halves(&parts[large]);
         parts[large] = left;
         parts.push(right);
     }
     // Parts whose items all have room need no node of their own.
-    while let Some(small) = largest(&parts, 2..N + 2 - parts.len()) {
+    while let Some(small) = largest(&parts, 2..width + 2 - parts.len()) {
         let part = parts.swap_remove(small);
         parts.extend(items.singles(&part));
     }
@@ -170,10 +173,10 @@ mod tests {
     }
 
     /// Checks that every item is referred to once and that boxes hold what is below them.
-    fn check<const N: usize>(items: &[TopItem], place: &str) -> TopLevel<N> {
-        let top = TopLevel::<N>::new(items, &[]);
+    fn check(items: &[TopItem], width: Width, place: &str) -> TopLevel {
+        let top = TopLevel::new(items, &[], width);
         assert!(
-            top.nodes.len() <= TopLevel::<N>::most_nodes(items.len()),
+            top.nodes.len() <= TopLevel::most_nodes(items.len()),
             "{place}"
         );
         let mut found = vec![0; items.len()];
@@ -184,7 +187,7 @@ mod tests {
                     ChildKind::Inner(child) => {
                         assert!(child > index, "{place}");
                         parents[child] += 1;
-                        top.nodes[child].all_bounds()
+                        top.nodes.get(child).all_bounds()
                     }
                     ChildKind::Instance(instance) => {
                         let item = top.instances[instance] as usize;
@@ -223,9 +226,9 @@ mod tests {
                 (nested, "nested"),
             ] {
                 let place = format!("{count} {kind}");
-                check::<4>(&items, &place);
-                check::<8>(&items, &place);
-                check::<16>(&items, &place);
+                for width in Width::ALL {
+                    check(&items, width, &place);
+                }
             }
         }
     }
@@ -238,7 +241,7 @@ mod tests {
             let [x, y, z] = rng.point(100.0);
             Aabb::around(&[[x, y, z], [x + 1.0, y + 1.0, z + 1.0]])
         });
-        let nodes = check::<8>(&items, "scattered").nodes.len();
+        let nodes = check(&items, Width::W8, "scattered").nodes.len();
         assert!(nodes < 10_000 / 4, "{nodes} nodes");
     }
 }

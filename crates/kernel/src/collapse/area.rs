@@ -4,18 +4,19 @@
 
 use crate::collapse::skeleton::{Children, Contraction};
 use crate::tree::binary::{BinaryKind, BinaryTree};
+use crate::tree::node::MAX_WIDTH;
 
 /// A node starts with one binary node; the one with the largest area is replaced by its own two children,
-/// in its place, until there are N or only leaves are left.
+/// in its place, until the wide node is full or only leaves are left.
 pub(crate) struct AreaCollapse;
 
-impl<const N: usize> Contraction<N> for AreaCollapse {
-    fn children(&self, tree: &BinaryTree, binary: usize) -> Children<N> {
+impl Contraction for AreaCollapse {
+    fn children(&self, tree: &BinaryTree, binary: usize, width: usize) -> Children {
         let mut children = Children::new(binary);
         // Areas of those that can be opened. The node itself is, if it can be, whatever its area.
-        let mut areas = [-1.0; N];
+        let mut areas = [-1.0; MAX_WIDTH];
         areas[0] = openable_area(tree, binary);
-        while children.len() < N {
+        while children.len() < width {
             // The first of equals, so that the result is one and the same everywhere.
             let (mut place, mut largest) = (0, -1.0);
             for (index, &area) in areas[..children.len()].iter().enumerate() {

@@ -18,23 +18,34 @@ use alloc::vec::Vec;
 
 use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
 
-use crate::collapse::skeleton::{Children, Contraction, ForVisits};
+use crate::collapse::skeleton::{Children, Contraction};
 use crate::parallel::join;
 use crate::tree::binary::{BinaryKind, BinaryTree};
+use crate::tree::node::MAX_WIDTH;
 
 /// Subtrees of at most this many nodes are computed by one thread.
 const SEQUENTIAL: usize = 2048;
 
 /// For each binary node `x` and number of slots `k`, how many of them its left child is best given, in
-/// `splits[x][k - 1]`; 0 where `x` is best a node of its own.
-pub(crate) struct CheapestCollapse<const N: usize> {
-    splits: Vec<[u8; N]>,
+/// `splits[width x + k - 1]`; 0 where `x` is best a node of its own.
+pub(crate) struct CheapestCollapse {
+    width: usize,
+    splits: Vec<u8>,
 }
 
-impl<const N: usize> CheapestCollapse<N> {
-    /// Finds the cheapest collapse. `weights` has, per binary node, the cost of visiting an inner one, were it a node
-    /// of the wide tree: finite and not negative.
-    pub fn new(tree: &BinaryTree, weights: &[f32]) -> Self {
+impl CheapestCollapse {
+    /// Finds the cheapest collapse to nodes of `width` children. `weights` has, per binary node, the cost of visiting an
+    /// inner one, were it a node of the wide tree: finite and not negative.
+    pub fn new(tree: &BinaryTree, weights: &[f32], width: usize) -> Self {
+        match width {
+            4 => Self::of::<4>(tree, weights),
+            8 => Self::of::<8>(tree, weights),
+            _ => Self::of::<16>(tree, weights),
+        }
+    }
+
+    /// For nodes of `N` children.
+    fn of<const N: usize>(tree: &BinaryTree, weights: &[f32]) -> Self {
         let mut splits = vec![[0; N]; tree.nodes.len()];
         if !splits.is_empty() {
             let search = Search {
@@ -44,25 +55,22 @@ impl<const N: usize> CheapestCollapse<N> {
             };
             search.cheapest(0, &mut splits);
         }
-        Self { splits }
+        Self {
+            width: N,
+            splits: splits.into_flattened(),
+        }
     }
 }
 
-impl<const N: usize> ForVisits<N> for CheapestCollapse<N> {
-    fn for_visits(tree: &BinaryTree, visits: &[f32]) -> Self {
-        Self::new(tree, visits)
-    }
-}
-
-impl<const N: usize> Contraction<N> for CheapestCollapse<N> {
-    fn children(&self, tree: &BinaryTree, binary: usize) -> Children<N> {
+impl Contraction for CheapestCollapse {
+    fn children(&self, tree: &BinaryTree, binary: usize, width: usize) -> Children {
         let mut children = Children::new(binary);
-        let mut slots = [0; N];
-        slots[0] = N;
+        let mut slots = [0; MAX_WIDTH];
+        slots[0] = width;
         let mut place = 0;
         while place < children.len() {
             let node = children.as_slice()[place] as usize;
-            let left = usize::from(self.splits[node][slots[place] - 1]);
+            let left = usize::from(self.splits[node * self.width + slots[place] - 1]);
             match tree.children(node) {
                 Some(pair) if left > 0 => {
                     slots.copy_within(place + 1..children.len(), place + 2);
@@ -284,19 +292,15 @@ mod tests {
             random_tree(&mut rng, leaves, &mut tree);
             // Small whole numbers: sums are exact, ties and zeros frequent.
             let weights: Vec<_> = tree.nodes.iter().map(|_| rng.below(9) as f32).collect();
-            let collapse = CheapestCollapse::<N>::new(&tree, &weights);
-            let skeleton = Skeleton::new(&tree, &collapse);
+            let collapse = CheapestCollapse::of::<N>(&tree, &weights);
+            let skeleton = Skeleton::new(&tree, &collapse, N);
             let cost: f32 = skeleton
                 .nodes
                 .iter()
                 .map(|node| weights[node.binary as usize])
                 .sum();
-            let leaves_found = skeleton
-                .nodes
-                .iter()
-                .flat_map(|node| node.children())
-                .filter(|child| child.offset == 0)
-                .count();
+            let children = skeleton.all_children().iter();
+            let leaves_found = children.filter(|child| child.offset == 0).count();
             let place = format!("seed {seed} round {round} width {N}");
             assert_eq!(leaves_found, leaves, "{place}");
             assert_eq!(cost, best_of_all::<N>(&tree, &weights), "{place}");

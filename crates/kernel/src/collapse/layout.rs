@@ -6,7 +6,6 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use crate::aabb::Aabb;
 use crate::collapse::skeleton::Skeleton;
 use crate::geometry::BLOCK;
 use crate::geometry::leaf_block::LeafBlock;
@@ -15,9 +14,11 @@ use crate::geometry::primitives::{PrimKind, Primitives};
 use crate::parallel;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 use crate::tree::leaves::{LeafBlocks, first_block};
-use crate::tree::node::{Child, Leaf, Node};
+use crate::tree::node::{Child, Leaf, Node, NodeMut};
+use crate::tree::nodes::Nodes;
 use crate::tree::rule::Rule;
-use crate::tree::wide::{PlacedTree, WideTree};
+use crate::tree::wide::{PlacedTree, Tree};
+use crate::tree::width::Width;
 
 /// Nodes or blocks that are written at one go, at least.
 const MIN_CHUNK: usize = 256;
@@ -26,27 +27,11 @@ const MAX_CHUNKS: usize = 64;
 /// Primitives are fetched from memory this many blocks before they are written.
 const AHEAD: usize = 3;
 
-/// A tree over nothing: a root without children.
-pub(crate) fn empty<const N: usize>() -> WideTree<N> {
-    WideTree {
-        nodes: vec![Node::EMPTY],
-        blocks: LeafBlocks::empty(),
-        instances: Vec::new(),
-        roots: Vec::new(),
-        filters: Arc::default(),
-        bounds: Aabb::EMPTY,
-        reach: 0.0,
-        depth: 1,
-        pick: Rule::Slots,
-        motion: None,
-    }
-}
-
 /// The tree of the world or of an object, to be laid out. A part has at least one node.
-pub(crate) struct Part<'a, const N: usize> {
+pub(crate) struct Part<'a> {
     pub primitives: &'a Primitives,
     pub tree: Cow<'a, BinaryTree>,
-    pub skeleton: Skeleton<N>,
+    pub skeleton: Skeleton,
     /// How often each place of [`BinaryTree::prims`] was hit, if that is known.
     pub prim_hits: Option<Cow<'a, [f32]>>,
 }
@@ -57,13 +42,13 @@ pub(crate) struct Part<'a, const N: usize> {
 ///
 /// # Panics
 /// If there are more nodes or leaves than child references can name.
-pub(crate) fn lay_out<const N: usize>(top: &Part<N>, objects: &[Option<Part<N>>]) -> WideTree<N> {
+pub(crate) fn lay_out(top: &Part, objects: &[Option<Part>], width: Width) -> Tree {
     let plan = Plan::new(top, objects);
     let bounds = top.tree.nodes[0].bounds;
     let deepest = plan.parts[1..].iter().map(|part| part.skeleton.depth());
     let depth = top.skeleton.depth() + deepest.max().unwrap_or(0);
-    WideTree {
-        nodes: plan.nodes(),
+    Tree {
+        nodes: plan.nodes(width),
         blocks: plan.all_blocks(),
         filters: Arc::clone(&top.primitives.filters),
         instances: plan.instances,
@@ -86,35 +71,41 @@ struct Job {
 }
 
 /// Places of everything that is to be written.
-struct Plan<'a, const N: usize> {
+struct Plan<'a> {
     /// The tree of the world, then the trees of the objects that exist.
-    parts: Vec<&'a Part<'a, N>>,
+    parts: Vec<&'a Part<'a>>,
     /// The root of each object that exists.
     roots: Vec<u32>,
     /// The root of each object. Without meaning for objects that do not exist.
     object_roots: Vec<u32>,
     nodes: Vec<Job>,
-    /// Per node, what its slots refer to.
-    references: Vec<[Child; N]>,
+    /// What the occupied slots of all nodes refer to, node after node.
+    references: Vec<Child>,
+    /// Per node, where its references begin.
+    first_references: Vec<u32>,
     /// Leaves of each kind, in the order of [`PrimKind::ALL`]. Without the empty block of triangles.
     leaves: [Vec<Job>; PrimKind::COUNT],
     instances: Vec<PlacedTree>,
 }
 
-impl<'a, const N: usize> Plan<'a, N> {
-    fn new(top: &'a Part<'a, N>, objects: &'a [Option<Part<'a, N>>]) -> Self {
+impl<'a> Plan<'a> {
+    fn new(top: &'a Part<'a>, objects: &'a [Option<Part<'a>>]) -> Self {
         let mut plan = Self {
             parts: vec![top],
             roots: Vec::new(),
             object_roots: vec![u32::MAX; objects.len()],
             nodes: Vec::new(),
             references: Vec::new(),
+            first_references: Vec::new(),
             leaves: Default::default(),
             instances: Vec::new(),
         };
         let count = plan.place_objects(objects);
         plan.nodes.reserve_exact(count);
-        plan.references.reserve_exact(count);
+        plan.first_references.reserve_exact(count);
+        let parts = plan.parts.iter();
+        let children = parts.map(|part| part.skeleton.all_children().len()).sum();
+        plan.references.reserve_exact(children);
         for part in 0..plan.parts.len() {
             plan.add_part(part);
         }
@@ -127,7 +118,7 @@ impl<'a, const N: usize> Plan<'a, N> {
     }
 
     /// Puts the trees of objects one behind the other and returns how many nodes there are in all.
-    fn place_objects(&mut self, objects: &'a [Option<Part<'a, N>>]) -> usize {
+    fn place_objects(&mut self, objects: &'a [Option<Part<'a>>]) -> usize {
         let mut end = self.parts[0].skeleton.nodes.len();
         for (object, root) in objects.iter().zip(&mut self.object_roots) {
             if let Some(object) = object {
@@ -150,15 +141,14 @@ impl<'a, const N: usize> Plan<'a, N> {
             places[index] = first + place;
         }
         for &index in &order {
-            let mut references = [Child::EMPTY; N];
-            let children = skeleton.nodes[index].children();
-            for (reference, child) in references.iter_mut().zip(children) {
-                *reference = match child.offset {
+            self.first_references.push(self.references.len() as u32);
+            for child in skeleton.children(index) {
+                let reference = match child.offset {
                     0 => self.add_leaf(part, child.binary),
                     offset => Child::inner(places[index + offset as usize]),
                 };
+                self.references.push(reference);
             }
-            self.references.push(references);
             self.nodes.push(Job {
                 part: part as u32,
                 node: index as u32,
@@ -195,20 +185,33 @@ impl<'a, const N: usize> Plan<'a, N> {
     }
 
     /// Writes all nodes.
-    fn nodes(&self) -> Vec<Node<N>> {
+    fn nodes(&self, width: Width) -> Nodes {
         let count = self.nodes.len();
-        parallel::fill(count, chunk(count), |places, slots| {
-            for place in places {
-                let Job { part, node: index } = self.nodes[place];
-                let Part { tree, skeleton, .. } = self.parts[part as usize];
-                let node = slots.push(Node::EMPTY);
-                let children = skeleton.nodes[index as usize].children();
-                for (slot, child) in children.iter().enumerate() {
-                    let bounds = &tree.nodes[child.binary as usize].bounds;
-                    node.set(slot, self.references[place][slot], bounds);
-                }
-            }
-        })
+        macro_rules! write {
+            ($Width:ident) => {
+                Nodes::$Width(parallel::fill(count, chunk(count), |places, slots| {
+                    for place in places {
+                        self.write_node(place, slots.push(Node::EMPTY).any_mut());
+                    }
+                }))
+            };
+        }
+        match width {
+            Width::W4 => write!(W4),
+            Width::W8 => write!(W8),
+            Width::W16 => write!(W16),
+        }
+    }
+
+    /// Writes a node.
+    fn write_node(&self, place: usize, mut node: NodeMut<'_>) {
+        let Job { part, node: index } = self.nodes[place];
+        let Part { tree, skeleton, .. } = self.parts[part as usize];
+        let references = &self.references[self.first_references[place] as usize..];
+        let children = skeleton.children(index as usize).iter().zip(references);
+        for (slot, (child, reference)) in children.enumerate() {
+            node.set(slot, *reference, &tree.nodes[child.binary as usize].bounds);
+        }
     }
 
     /// Writes all leaf blocks.

@@ -1,8 +1,6 @@
 //! From the binary tree to N children per node: which nodes stay, in which order they are visited, where they are in
 //! memory.
 
-use alloc::vec::Vec;
-
 mod area;
 mod cheapest;
 pub(crate) mod layout;
@@ -10,19 +8,22 @@ pub(crate) mod skeleton;
 mod split_leaves;
 
 use alloc::borrow::Cow;
+use alloc::boxed::Box;
+use alloc::vec::Vec;
 
 use crate::aabb::Aabb;
 use crate::collapse::area::AreaCollapse;
 use crate::collapse::cheapest::CheapestCollapse;
 use crate::collapse::layout::Part;
-use crate::collapse::skeleton::{ForVisits, Skeleton, SkeletonNode, Sorting};
+use crate::collapse::skeleton::{Contraction, Skeleton, Sorting};
 use crate::collapse::split_leaves::SplitLeaves;
 use crate::geometry::primitives::Primitives;
 use crate::learn::tree_log::TreeLog;
 use crate::parallel;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 use crate::tree::costs::CostModel;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
+use crate::tree::width::Width;
 use antumbra_simd::named_list;
 
 /// Weight of the area prior, as a share of the rays in the log: what no ray visited is collapsed by area, and an open
@@ -106,14 +107,14 @@ impl Default for Learning {
 }
 
 /// Collapses by area; slots in the depth-first order of the binary tree.
-pub(crate) fn by_area<const N: usize>(primitives: &Primitives, tree: &BinaryTree) -> WideTree<N> {
+pub(crate) fn by_area(primitives: &Primitives, tree: &BinaryTree, width: Width) -> Tree {
     if tree.nodes.is_empty() {
-        return layout::empty();
+        return Tree::empty(width);
     }
     let top = Part {
         primitives,
         tree: Cow::Borrowed(tree),
-        skeleton: Skeleton::new(tree, &AreaCollapse),
+        skeleton: Skeleton::new(tree, &AreaCollapse, width.lanes()),
         prim_hits: None,
     };
     let objects = parallel::map(tree.objects.len(), 1, |object| {
@@ -121,22 +122,23 @@ pub(crate) fn by_area<const N: usize>(primitives: &Primitives, tree: &BinaryTree
         (!tree.nodes.is_empty()).then(|| Part {
             primitives: &primitives.objects[object],
             tree: Cow::Borrowed(tree),
-            skeleton: Skeleton::new(tree, &AreaCollapse),
+            skeleton: Skeleton::new(tree, &AreaCollapse, width.lanes()),
             prim_hits: None,
         })
     });
-    layout::lay_out(&top, &objects)
+    layout::lay_out(&top, &objects, width)
 }
 
 /// Collapses by what is in a log of this tree. Returns the cost that equation (1) predicts, too.
-pub(crate) fn by_log<const N: usize>(
+pub(crate) fn by_log(
     primitives: &Primitives,
     tree: &BinaryTree,
     log: &TreeLog,
     learning: &Learning,
-) -> (WideTree<N>, f64) {
+    width: Width,
+) -> (Tree, f64) {
     if tree.nodes.is_empty() {
-        return (layout::empty(), f64::from(learning.model.node));
+        return (Tree::empty(width), f64::from(learning.model.node));
     }
     let learning = &Learning {
         sort: learning.sort && learning.collapse.sorts(),
@@ -149,23 +151,23 @@ pub(crate) fn by_log<const N: usize>(
             return (None, 0.0);
         }
         let primitives = &primitives.objects[object];
-        let (part, cost) = part(primitives, tree, log, learning, &[]);
+        let (part, cost) = part(primitives, (tree, log), learning, &[], width.lanes());
         (Some(part), cost)
     });
     let (objects, costs): (Vec<_>, Vec<_>) = learned.into_iter().unzip();
-    let (top, cost) = part(primitives, tree, log, learning, &costs);
-    (layout::lay_out(&top, &objects), cost)
+    let (top, cost) = part(primitives, (tree, log), learning, &costs, width.lanes());
+    (layout::lay_out(&top, &objects, width), cost)
 }
 
 /// What is learned of a tree of at least one node, and the cost predicted. `objects` are the costs predicted for
 /// those that its instances place.
-fn part<'a, const N: usize>(
+fn part<'a>(
     primitives: &'a Primitives,
-    tree: &'a BinaryTree,
-    log: &'a TreeLog,
+    (tree, log): (&'a BinaryTree, &'a TreeLog),
     learning: &Learning,
     objects: &[f64],
-) -> (Part<'a, N>, f64) {
+    width: usize,
+) -> (Part<'a>, f64) {
     let counts = &log.counts(tree);
     let sorting = Sorting {
         counts,
@@ -174,32 +176,32 @@ fn part<'a, const N: usize>(
         model: &learning.model,
         sort: learning.sort,
     };
-    let rays = Rays::new(tree, log);
+    let rays = Rays::new(tree, log, width);
+    let sorted = |collapse: &dyn Contraction| Skeleton::sorted(tree, collapse, width, sorting);
     let (skeleton, cost) = match learning.collapse {
-        Collapse::Area => Skeleton::sorted(tree, &AreaCollapse, sorting),
+        Collapse::Area => sorted(&AreaCollapse),
         Collapse::Sah => {
             let prior = AreaPrior::new(tree, 0.0);
             let areas: Vec<_> = (tree.nodes.iter())
                 .map(|node| prior.of(&node.bounds))
                 .collect();
-            Skeleton::sorted(tree, &CheapestCollapse::<N>::new(tree, &areas), sorting)
+            sorted(&CheapestCollapse::new(tree, &areas, width))
         }
         #[cfg(feature = "lab")]
         Collapse::Rsc => {
             use crate::lab::rsc::RscCollapse;
-            let visits = rays.visits::<RscCollapse, N>(sorting, false);
-            let collapse = <RscCollapse as ForVisits<N>>::for_visits(tree, &visits);
-            Skeleton::sorted(tree, &collapse, sorting)
+            let contract = |visits: &[f32]| Box::new(RscCollapse::new(visits)) as Box<_>;
+            let visits = rays.visits(&contract, sorting, false);
+            sorted(&*contract(&visits))
         }
         // `learned-unsorted` in the laboratory.
         _ => {
-            let visits = rays.visits::<CheapestCollapse<N>, N>(sorting, learning.thorough);
+            let visits = rays.visits(&rays.cheapest(), sorting, learning.thorough);
             // Of a log without rays nothing can be learned that is worth memory.
             if log.weight() > 0.0 {
                 return opened(primitives, sorting, &rays, &visits);
             }
-            let collapse = CheapestCollapse::<N>::new(tree, &visits);
-            Skeleton::sorted(tree, &collapse, sorting)
+            sorted(&CheapestCollapse::new(tree, &visits, width))
         }
     };
     let part = Part {
@@ -212,20 +214,20 @@ fn part<'a, const N: usize>(
 }
 
 /// The learned collapse for rays that visit nodes so often, leaves being opened where that pays.
-fn opened<'a, const N: usize>(
+fn opened<'a>(
     primitives: &'a Primitives,
     sorting: Sorting,
     rays: &Rays,
     visits: &[f32],
-) -> (Part<'a, N>, f64) {
+) -> (Part<'a>, f64) {
     let opened = SplitLeaves::new(primitives, rays.tree, |node| visits[node]);
     let visits: Vec<_> = (opened.origins.iter().zip(&opened.shares))
         .map(|(origin, share)| visits[*origin as usize] * share)
         .collect();
-    let collapse = CheapestCollapse::<N>::new(&opened.tree, &visits);
+    let collapse = CheapestCollapse::new(&opened.tree, &visits, rays.width);
     let counts = &opened.counts(sorting.counts, rays.log);
     let sorting = Sorting { counts, ..sorting };
-    let (skeleton, cost) = Skeleton::sorted(&opened.tree, &collapse, sorting);
+    let (skeleton, cost) = Skeleton::sorted(&opened.tree, &collapse, rays.width, sorting);
     let prim_hits = sorting.sort.then(|| opened.prim_hits(rays.log));
     let part = Part {
         primitives,
@@ -241,12 +243,27 @@ struct Rays<'a> {
     tree: &'a BinaryTree,
     log: &'a TreeLog,
     prior: AreaPrior,
+    /// Children per node of the trees that they visit.
+    width: usize,
 }
 
+/// The contraction for rays that visit each inner binary node so often, were it a node of the wide tree: finite and not
+/// negative. Leaves have a number, too, of no meaning.
+type Contract<'a> = dyn Fn(&[f32]) -> Box<dyn Contraction> + 'a;
+
 impl<'a> Rays<'a> {
-    fn new(tree: &'a BinaryTree, log: &'a TreeLog) -> Self {
-        let prior = AreaPrior::new(tree, log.weight());
-        Self { tree, log, prior }
+    fn new(tree: &'a BinaryTree, log: &'a TreeLog, width: usize) -> Self {
+        Self {
+            tree,
+            log,
+            prior: AreaPrior::new(tree, log.weight()),
+            width,
+        }
+    }
+
+    /// The contraction of least cost.
+    fn cheapest(&self) -> impl Fn(&[f32]) -> Box<dyn Contraction> {
+        |visits| Box::new(CheapestCollapse::new(self.tree, visits, self.width))
     }
 
     /// How many of them visit each node. The visits depend on the order of children, and the order on the collapse. At
@@ -257,18 +274,14 @@ impl<'a> Rays<'a> {
     /// and keeps the result that costs the rays of the log less: on sponza, 8 wide, that saves up to 18 % of the node
     /// tests, elsewhere nothing to 2 %. Random starts promise more by the model than they keep (up to 4 % more node
     /// tests on sibenik).
-    fn visits<C: ForVisits<N>, const N: usize>(
-        &self,
-        sorting: Sorting,
-        thorough: bool,
-    ) -> Vec<f32> {
-        let from = |start: &[f32]| self.visits_if::<C, N>(sorting, &self.with_prior(start));
+    fn visits(&self, contract: &Contract<'_>, sorting: Sorting, thorough: bool) -> Vec<f32> {
+        let from = |start: &[f32]| self.visits_if(contract, sorting, &self.with_prior(start));
         let first = from(&sorting.counts.entered).0;
         if !thorough || self.log.weight() == 0.0 {
             return first;
         }
         let second = from(&sorting.counts.hits).0;
-        let cost = |visits: &[f32]| self.visits_if::<C, N>(sorting, visits).1;
+        let cost = |visits: &[f32]| self.visits_if(contract, sorting, visits).1;
         if cost(&second) < cost(&first) {
             second
         } else {
@@ -278,17 +291,17 @@ impl<'a> Rays<'a> {
 
     /// How many of them visit each node in the tree for rays that visit nodes so often, and what the rays of the log
     /// cost there below the root.
-    fn visits_if<C: ForVisits<N>, const N: usize>(
+    fn visits_if(
         &self,
+        contract: &Contract<'_>,
         sorting: Sorting,
         visits: &[f32],
     ) -> (Vec<f32>, f64) {
-        let collapse = C::for_visits(self.tree, visits);
         let sorted = Sorting {
             sort: true,
             ..sorting
         };
-        let (skeleton, _) = Skeleton::sorted(self.tree, &collapse, sorted);
+        let (skeleton, _) = Skeleton::sorted(self.tree, &*contract(visits), self.width, sorted);
         let visits = self.log.visits(&skeleton.ranks(self.tree));
         let cost = |binary: usize| {
             let once = match self.tree.nodes[binary].kind {
@@ -299,7 +312,7 @@ impl<'a> Rays<'a> {
             };
             once * f64::from(visits[binary])
         };
-        let children = skeleton.nodes.iter().flat_map(SkeletonNode::children);
+        let children = skeleton.all_children().iter();
         let cost = children.map(|child| cost(child.binary as usize)).sum();
         (self.with_prior(&visits), cost)
     }
@@ -378,7 +391,7 @@ mod tests {
                     sort: sort && collapse.sorts(),
                     ..Default::default()
                 };
-                let (part, _) = part::<8>(&primitives, &tree, &log, &learning, &[]);
+                let (part, _) = part(&primitives, (&tree, &log), &learning, &[], 8);
                 let (skeleton, own_tree) = (&part.skeleton, &part.tree);
                 // Of the tree with its leaves opened, if they are.
                 let mut own_log = TreeLog::new(own_tree);
@@ -416,10 +429,10 @@ mod tests {
                 model: &learning.model,
                 sort: true,
             };
-            let rays = Rays::new(&tree, &log);
+            let rays = Rays::new(&tree, &log, 8);
             let [one, two] = [false, true].map(|thorough| {
-                let visits = rays.visits::<CheapestCollapse<8>, 8>(sorting, thorough);
-                (rays.visits_if::<CheapestCollapse<8>, 8>(sorting, &visits)).1
+                let visits = rays.visits(&rays.cheapest(), sorting, thorough);
+                rays.visits_if(&rays.cheapest(), sorting, &visits).1
             });
             assert!(two <= one, "seed {seed}: {two}, {one} with one start");
             better += usize::from(two < one);
@@ -428,7 +441,7 @@ mod tests {
                     thorough,
                     ..learning
                 };
-                let (part, _) = part::<8>(&primitives, &tree, &log, &learning, &[]);
+                let (part, _) = part(&primitives, (&tree, &log), &learning, &[], 8);
                 let nodes = part.skeleton.nodes.iter();
                 nodes.map(|node| node.binary).collect::<Vec<_>>()
             });
@@ -442,7 +455,7 @@ mod tests {
     fn an_empty_log_gives_the_least_area() {
         let (primitives, tree, _) = scene(52);
         let log = TreeLog::new(&tree);
-        let area = |skeleton: &Skeleton<8>| -> f64 {
+        let area = |skeleton: &Skeleton| -> f64 {
             let area = |node: usize| f64::from(tree.nodes[node].bounds.half_area());
             skeleton
                 .nodes
@@ -450,8 +463,8 @@ mod tests {
                 .map(|node| area(node.binary as usize))
                 .sum()
         };
-        let (learned, _) = part::<8>(&primitives, &tree, &log, &Learning::default(), &[]);
-        assert!(area(&learned.skeleton) <= area(&Skeleton::new(&tree, &AreaCollapse)));
+        let (learned, _) = part(&primitives, (&tree, &log), &Learning::default(), &[], 8);
+        assert!(area(&learned.skeleton) <= area(&Skeleton::new(&tree, &AreaCollapse, 8)));
     }
 
     /// No collapse has less area than the one that is to have the least, whatever the log says.
@@ -465,7 +478,7 @@ mod tests {
                 collapse,
                 ..Default::default()
             };
-            let (part, _) = part::<8>(&primitives, &tree, &log, &learning, &[]);
+            let (part, _) = part(&primitives, (&tree, &log), &learning, &[], 8);
             let nodes = part.skeleton.nodes.iter();
             let area = |node: usize| f64::from(part.tree.nodes[node].bounds.half_area());
             nodes.map(|node| area(node.binary as usize)).sum()

@@ -3,43 +3,38 @@
 
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use crate::geometry::primitives::Primitives;
 use crate::learn::tree_log::NodeCounts;
 use crate::order::ratio::{area_shares, cost_any, precise_chances};
-use crate::order::sorted_by_key;
+use crate::order::{AS_THEY_ARE, sorted_by_key};
 use crate::parallel;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 use crate::tree::costs::CostModel;
+use crate::tree::node::{MAX_WIDTH, PerSlot};
 
 /// Subtrees of at most this many binary nodes are the work of one thread.
 const SEQUENTIAL: usize = 2048;
 
 /// Decides which binary nodes become the children of one wide node.
-pub(crate) trait Contraction<const N: usize>: Sync {
-    /// The children of the wide node made of binary node `binary`, in depth-first order. Children of an inner
+pub(crate) trait Contraction: Sync {
+    /// The children of the wide node made of binary node `binary`, at most `width`, in depth-first order. Children of an inner
     /// node are at least two nodes below it; a leaf, which only the root can be, is its own child.
-    fn children(&self, tree: &BinaryTree, binary: usize) -> Children<N>;
+    fn children(&self, tree: &BinaryTree, binary: usize, width: usize) -> Children;
 }
 
-/// A contraction for rays that are known.
-pub(crate) trait ForVisits<const N: usize>: Contraction<N> + Sized {
-    /// For rays that visit each inner binary node so often, were it a node of the wide tree: finite and not
-    /// negative. Leaves have a number, too, of no meaning.
-    fn for_visits(tree: &BinaryTree, visits: &[f32]) -> Self;
-}
-
-/// Up to `N` binary nodes.
+/// Up to [`MAX_WIDTH`] binary nodes.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Children<const N: usize> {
-    nodes: [u32; N],
+pub(crate) struct Children {
+    nodes: PerSlot<u32>,
     len: usize,
 }
 
-impl<const N: usize> Children<N> {
+impl Children {
     /// One node, to be opened.
     pub fn new(node: usize) -> Self {
-        let mut nodes = [0; N];
+        let mut nodes = [0; MAX_WIDTH];
         nodes[0] = node as u32;
         Self { nodes, len: 1 }
     }
@@ -63,20 +58,23 @@ impl<const N: usize> Children<N> {
 
 /// A wide tree made of binary nodes. Its nodes are in the depth-first order of the binary tree, whatever the order of
 /// their children.
-#[derive(Clone, Debug)]
-pub(crate) struct Skeleton<const N: usize> {
-    pub nodes: Vec<SkeletonNode<N>>,
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Skeleton {
+    pub nodes: Vec<SkeletonNode>,
+    /// The children of all nodes.
+    children: Vec<SkeletonChild>,
 }
 
 /// A node of it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct SkeletonNode<const N: usize> {
+pub(crate) struct SkeletonNode {
     /// The binary node it is made of.
+    #[cfg(test)]
     pub binary: u32,
+    /// Index of its first child.
+    first: u32,
     /// How many children it has.
-    pub len: usize,
-    /// The children, in visiting order.
-    pub children: [SkeletonChild; N],
+    len: u32,
 }
 
 /// A child in it.
@@ -88,10 +86,9 @@ pub(crate) struct SkeletonChild {
     pub offset: u32,
 }
 
-impl<const N: usize> SkeletonNode<N> {
-    /// The occupied slots.
-    pub fn children(&self) -> &[SkeletonChild] {
-        &self.children[..self.len]
+impl SkeletonNode {
+    fn range(&self) -> Range<usize> {
+        self.first as usize..(self.first + self.len) as usize
     }
 }
 
@@ -108,34 +105,62 @@ pub(crate) struct Sorting<'a> {
     pub sort: bool,
 }
 
-impl<const N: usize> Skeleton<N> {
-    /// Collapses a tree of at least one node. Children are in the depth-first order of the binary tree.
-    pub fn new(tree: &BinaryTree, contraction: &impl Contraction<N>) -> Self {
-        Self::build(tree, contraction, None).0
+impl Skeleton {
+    /// Collapses a tree of at least one node to nodes of `width` children. Children are in the depth-first order of the
+    /// binary tree.
+    pub fn new(tree: &BinaryTree, contraction: &dyn Contraction, width: usize) -> Self {
+        Self::build(tree, contraction, width, None).0
     }
 
     /// Collapses with children sorted by falling `H / (I C)`, and `C_any` of the root.
     pub fn sorted(
         tree: &BinaryTree,
-        contraction: &impl Contraction<N>,
+        contraction: &dyn Contraction,
+        width: usize,
         sorting: Sorting,
     ) -> (Self, f64) {
-        Self::build(tree, contraction, Some(sorting))
+        Self::build(tree, contraction, width, Some(sorting))
     }
 
     fn build(
         tree: &BinaryTree,
-        contraction: &impl Contraction<N>,
+        contraction: &dyn Contraction,
+        width: usize,
         sorting: Option<Sorting>,
     ) -> (Self, f64) {
         let work = Work {
             tree,
             contraction,
+            width,
             sorting,
         };
-        let mut nodes = Vec::with_capacity(tree.nodes.len() / N);
-        let cost = work.append(0, tree.nodes.len(), &mut nodes);
-        (Self { nodes }, cost)
+        let mut skeleton = Self {
+            nodes: Vec::with_capacity(tree.nodes.len() / width),
+            children: Vec::with_capacity(tree.nodes.len() / 2),
+        };
+        let cost = work.append(0, tree.nodes.len(), &mut skeleton);
+        (skeleton, cost)
+    }
+
+    /// The children of a node, in visiting order.
+    pub fn children(&self, node: usize) -> &[SkeletonChild] {
+        &self.children[self.nodes[node].range()]
+    }
+
+    /// The children of all nodes.
+    pub fn all_children(&self) -> &[SkeletonChild] {
+        &self.children
+    }
+
+    /// Appends a subtree. Its nodes name each other by relative places, its children do not.
+    fn append(&mut self, part: Self) {
+        let first = self.children.len() as u32;
+        self.nodes
+            .extend(part.nodes.iter().map(|node| SkeletonNode {
+                first: first + node.first,
+                ..*node
+            }));
+        self.children.extend(part.children);
     }
 
     /// The nodes as a query that hits every box visits them.
@@ -144,7 +169,7 @@ impl<const N: usize> Skeleton<N> {
         let mut open = vec![0];
         while let Some(index) = open.pop() {
             order.push(index);
-            let children = self.nodes[index].children().iter().rev();
+            let children = self.children(index).iter().rev();
             open.extend(
                 children
                     .filter(|child| child.offset != 0)
@@ -157,8 +182,12 @@ impl<const N: usize> Skeleton<N> {
     /// Levels of nodes, the root being one.
     pub fn depth(&self) -> usize {
         let mut levels = vec![1; self.nodes.len()];
-        for (index, node) in self.nodes.iter().enumerate() {
-            for child in node.children().iter().filter(|child| child.offset != 0) {
+        for index in 0..self.nodes.len() {
+            for child in self
+                .children(index)
+                .iter()
+                .filter(|child| child.offset != 0)
+            {
                 levels[index + child.offset as usize] = levels[index] + 1;
             }
         }
@@ -175,7 +204,7 @@ impl<const N: usize> Skeleton<N> {
             match tree.nodes[child.binary as usize].kind {
                 BinaryKind::Inner { .. } => {
                     let index = parent + child.offset as usize;
-                    let children = self.nodes[index].children().iter().rev();
+                    let children = self.children(index).iter().rev();
                     open.extend(children.map(|child| (*child, index)));
                 }
                 BinaryKind::Leaf { .. } => {
@@ -194,86 +223,75 @@ impl<const N: usize> Skeleton<N> {
 }
 
 /// Constants of the whole collapse.
-struct Work<'a, C> {
+struct Work<'a> {
     tree: &'a BinaryTree,
-    contraction: &'a C,
+    contraction: &'a dyn Contraction,
+    width: usize,
     sorting: Option<Sorting<'a>>,
 }
 
-impl<C> Work<'_, C> {
+impl Work<'_> {
     /// Appends the wide node made of `binary` and all below it, which are less than `size` binary nodes. Returns
     /// its cost.
-    fn append<const N: usize>(
-        &self,
-        binary: usize,
-        size: usize,
-        nodes: &mut Vec<SkeletonNode<N>>,
-    ) -> f64
-    where
-        C: Contraction<N>,
-    {
-        let found = self.contraction.children(self.tree, binary);
+    fn append(&self, binary: usize, size: usize, skeleton: &mut Skeleton) -> f64 {
+        let found = self.contraction.children(self.tree, binary, self.width);
         let found = found.as_slice();
-        let mut node = SkeletonNode {
-            binary: binary as u32,
-            len: found.len(),
-            children: [SkeletonChild::default(); N],
+        // What is below a child ends where the next one begins, or before.
+        let size_of = |slot: usize| {
+            let end = found.get(slot + 1);
+            end.map_or(binary + size, |next| *next as usize) - found[slot] as usize
         };
-        let mut costs = [0.0; N];
-        let mut sizes = [0; N];
-        for slot in 0..found.len() {
-            node.children[slot].binary = found[slot];
-            // What is below a child ends where the next one begins, or before.
-            let end = found
-                .get(slot + 1)
-                .map_or(binary + size, |next| *next as usize);
-            sizes[slot] = end - found[slot] as usize;
-        }
-        let place = nodes.len();
-        nodes.push(node);
+        let place = skeleton.nodes.len();
+        let node = SkeletonNode {
+            #[cfg(test)]
+            binary: binary as u32,
+            first: skeleton.children.len() as u32,
+            len: found.len() as u32,
+        };
+        skeleton.nodes.push(node);
+        let children = found
+            .iter()
+            .map(|&binary| SkeletonChild { binary, offset: 0 });
+        skeleton.children.extend(children);
+        let mut costs = [0.0; MAX_WIDTH];
+        let mut add = |slot: usize, skeleton: &mut Skeleton, before: usize, cost: f64| {
+            if skeleton.nodes.len() > before {
+                skeleton.children[node.first as usize + slot].offset = (before - place) as u32;
+            }
+            costs[slot] = cost;
+        };
         if size > SEQUENTIAL {
             let parts = parallel::map(found.len(), 1, |slot| {
-                let mut nodes = Vec::new();
-                let cost = self.append_child(found[slot] as usize, sizes[slot], &mut nodes);
-                (nodes, cost)
+                let mut part = Skeleton::default();
+                let cost = self.append_child(found[slot] as usize, size_of(slot), &mut part);
+                (part, cost)
             });
-            for (slot, (mut part, cost)) in parts.into_iter().enumerate() {
-                if !part.is_empty() {
-                    node.children[slot].offset = (nodes.len() - place) as u32;
-                }
-                // Children are found by relative places, so subtrees can be moved as they are.
-                nodes.append(&mut part);
-                costs[slot] = cost;
+            for (slot, (part, cost)) in parts.into_iter().enumerate() {
+                let before = skeleton.nodes.len();
+                skeleton.append(part);
+                add(slot, skeleton, before, cost);
             }
         } else {
             for slot in 0..found.len() {
-                let offset = (nodes.len() - place) as u32;
-                costs[slot] = self.append_child(found[slot] as usize, sizes[slot], nodes);
-                if nodes.len() > place + offset as usize {
-                    node.children[slot].offset = offset;
-                }
+                let before = skeleton.nodes.len();
+                let cost = self.append_child(found[slot] as usize, size_of(slot), skeleton);
+                add(slot, skeleton, before, cost);
             }
         }
-        let cost = match &self.sorting {
-            Some(sorting) => sorting.finish(self.tree, &mut node, &costs),
-            None => 0.0,
-        };
-        nodes[place] = node;
-        cost
+        self.sorting.map_or(0.0, |sorting| {
+            sorting.finish(
+                self.tree,
+                binary,
+                &mut skeleton.children[node.range()],
+                &costs,
+            )
+        })
     }
 
     /// Appends a child, which may be a leaf. Returns its cost.
-    fn append_child<const N: usize>(
-        &self,
-        binary: usize,
-        size: usize,
-        nodes: &mut Vec<SkeletonNode<N>>,
-    ) -> f64
-    where
-        C: Contraction<N>,
-    {
+    fn append_child(&self, binary: usize, size: usize, skeleton: &mut Skeleton) -> f64 {
         match self.tree.nodes[binary].kind {
-            BinaryKind::Inner { .. } => self.append(binary, size, nodes),
+            BinaryKind::Inner { .. } => self.append(binary, size, skeleton),
             BinaryKind::Leaf { first, count } => self.sorting.map_or(0.0, |sorting| {
                 sorting.leaf_cost(self.tree.prims[first as usize], count)
             }),
@@ -291,38 +309,39 @@ impl Sorting<'_> {
         }
     }
 
-    /// Sorts the children of a node, which have these costs. Returns the cost of the node.
-    fn finish<const N: usize>(
+    /// Sorts the children of the wide node made of `binary`, which have these costs. Returns the cost of the node.
+    fn finish(
         &self,
         tree: &BinaryTree,
-        node: &mut SkeletonNode<N>,
-        costs: &[f64; N],
+        binary: usize,
+        children: &mut [SkeletonChild],
+        costs: &PerSlot<f64>,
     ) -> f64 {
-        let SkeletonNode {
-            binary,
-            len,
-            children,
-        } = *node;
-        let (mut box_hits, mut hits, mut areas) = ([0.0; N], [0.0; N], [0.0; N]);
-        for slot in 0..len {
-            let binary = children[slot].binary as usize;
+        let len = children.len();
+        let [mut box_hits, mut hits] = [[0.0; MAX_WIDTH]; 2];
+        let mut areas = [0.0; MAX_WIDTH];
+        for (slot, child) in children.iter().enumerate() {
+            let binary = child.binary as usize;
             box_hits[slot] = f64::from(self.counts.entered[binary]);
             hits[slot] = f64::from(self.counts.hits[binary]);
             areas[slot] = tree.nodes[binary].bounds.half_area();
         }
-        let binary = binary as usize;
         let shares = area_shares(&areas, tree.nodes[binary].bounds.half_area());
         let entered = f64::from(self.counts.entered[binary]);
         let mut chances = precise_chances(len, entered, &box_hits, &hits, &shares);
         for (chance, cost) in chances.iter_mut().zip(costs) {
             chance.cost = *cost;
         }
+        let mut order = AS_THEY_ARE;
         if self.sort {
-            let keys = core::array::from_fn(|slot| chances[slot].key());
-            let order = sorted_by_key(len, &keys, &areas);
-            node.children = order.map(|slot| children[usize::from(slot)]);
-            chances = order.map(|slot| chances[usize::from(slot)]);
+            order = sorted_by_key(len, &chances.map(|chance| chance.key()), &areas);
+            let mut unsorted = [SkeletonChild::default(); MAX_WIDTH];
+            unsorted[..len].copy_from_slice(children);
+            for (child, slot) in children.iter_mut().zip(order) {
+                *child = unsorted[usize::from(slot)];
+            }
         }
-        cost_any(f64::from(self.model.node), chances)
+        let sorted = order[..len].iter().map(|slot| chances[usize::from(*slot)]);
+        cost_any(f64::from(self.model.node), sorted)
     }
 }

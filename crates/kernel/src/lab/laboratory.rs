@@ -1,6 +1,7 @@
 //! The steps of learning as methods of a tree, and queries that count what they do.
 
 use alloc::vec;
+use core::time::Duration;
 
 use antumbra_simd::Isa;
 
@@ -19,7 +20,6 @@ use crate::parallel;
 use crate::ray::Ray;
 use crate::trace::observe::Cost;
 use crate::trace::pick::Pick;
-use crate::tree::any::on_tree;
 use crate::tree::binary::BinaryTree;
 use crate::tree::costs::CostModel;
 use crate::tree::slot_order::SlotOrder;
@@ -131,6 +131,20 @@ pub trait Laboratory: Sized {
     ///
     /// The difference to [`Laboratory::visits`] is the most that any order can still save.
     fn oracle_visits(&self, rays: &[Ray]) -> Visits;
+
+    /// Has batches prefetch or not: as the recipe says, or else as a short timing of `rays` by its clock decides.
+    fn choose_prefetch(&mut self, rays: &[Ray], recipe: &Recipe);
+
+    /// Has batches prefetch nodes and leaves from now on, or not.
+    fn set_prefetch(&mut self, prefetch: bool);
+
+    /// Times `rays`, as occlusion queries on the calling thread, with and without prefetching of nodes and leaves.
+    /// Keeps what is faster and returns it. `clock` returns the time that has passed since some moment: the kernel has
+    /// no clock.
+    ///
+    /// A few thousand rays like the ones to come are enough. Rays traced for the first time say more than rays that
+    /// were just traced. With fewer than 512 rays, or a clock that does not advance, the setting stays as it is.
+    fn time_prefetch(&mut self, rays: &[Ray], clock: impl Fn() -> Duration) -> bool;
 }
 
 impl Laboratory for Bvh {
@@ -223,12 +237,24 @@ impl Laboratory for Bvh {
             let mut log = RayLog::default();
             self.follow(rays, &mut log);
             let mut sum = Visits::default();
-            on_tree!(&self.tree, tree => oracle::add_shortest(tree, &log, &mut sum));
+            oracle::add_shortest(&self.tree, &log, &mut sum);
             // Rays that cannot hit anything are not in the log.
             let all = sum.occluded_rays + sum.unoccluded_rays;
             sum.unoccluded_rays += rays.len() as u64 - all;
             sum
         })
+    }
+
+    fn choose_prefetch(&mut self, rays: &[Ray], recipe: &Recipe) {
+        self.choose_prefetch(rays, recipe)
+    }
+
+    fn set_prefetch(&mut self, prefetch: bool) {
+        self.set_prefetch(prefetch)
+    }
+
+    fn time_prefetch(&mut self, rays: &[Ray], clock: impl Fn() -> Duration) -> bool {
+        self.time_prefetch(rays, clock)
     }
 }
 

@@ -26,13 +26,14 @@
 //! ```
 //!
 //! - `laboratory`: the steps of learning, and queries that count;  `oracle`: a bound for every order
-//! - `orders`: child orders of the laboratory: `random`, `rtsah`
+//! - `orders`: child orders of the laboratory: `random`, `rtsah`, and the one that looks at the ray (`by_ray`)
 //! - `builders`: builders of the laboratory: `ploc`, `sbvh`, `ray_driven`, `pbrt`;
 //!   `pieces` and `candidates` serve them
 //! - `rsc`: a collapse by visits
 //! - `saved`: orders and logs in files;  `steps`: single steps of a traversal, for benches
 
 pub(crate) mod builders;
+pub(crate) mod by_ray;
 pub(crate) mod candidates;
 mod laboratory;
 mod oracle;

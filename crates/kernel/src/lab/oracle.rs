@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 
 use crate::learn::ray_log::{RayLog, Visit};
 use crate::tree::node::ChildKind;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 
 /// Node tests of occlusion queries, counted separately for rays that are occluded and rays that are not. A node test is
 /// one of all N boxes of a node.
@@ -70,7 +70,7 @@ fn mean(sum: u64, count: u64) -> f64 {
 }
 
 /// Adds the rays of a log, each by its shortest path.
-pub(crate) fn add_shortest<const N: usize>(bvh: &WideTree<N>, log: &RayLog, sum: &mut Visits) {
+pub(crate) fn add_shortest(tree: &Tree, log: &RayLog, sum: &mut Visits) {
     let mut shortest = Vec::new();
     for range in log.ranges() {
         let visits = &log.visits()[range];
@@ -78,7 +78,7 @@ pub(crate) fn add_shortest<const N: usize>(bvh: &WideTree<N>, log: &RayLog, sum:
         shortest.clear();
         shortest.resize(visits.len(), 0u64);
         for place in (0..visits.len()).rev() {
-            shortest[place] = below(bvh, visits, place, &shortest);
+            shortest[place] = below(tree, visits, place, &shortest);
         }
         match visits.first() {
             Some(root) if root.occluding != 0 => sum.add(true, shortest[0]),
@@ -88,9 +88,9 @@ pub(crate) fn add_shortest<const N: usize>(bvh: &WideTree<N>, log: &RayLog, sum:
 }
 
 /// Nodes on the shortest path from a visit to an occluder, both ends included; of no meaning if there is none.
-fn below<const N: usize>(bvh: &WideTree<N>, visits: &[Visit], place: usize, known: &[u64]) -> u64 {
+fn below(tree: &Tree, visits: &[Visit], place: usize, known: &[u64]) -> u64 {
     let visit = &visits[place];
-    let node = &bvh.nodes[visit.node as usize];
+    let node = tree.nodes.get(visit.node as usize);
     let mut least = u64::MAX;
     let mut next = place + 1;
     for slot in 0..node.len() {

@@ -1,32 +1,28 @@
 //! A random order: what every other one has to beat. One permutation for each node, the same for all rays and the same
 //! in every call.
 
-use alloc::vec::Vec;
-
 use crate::hash;
+use crate::order::AS_THEY_ARE;
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 
 /// Any seed does.
 const SEED: u64 = 2016;
 
 /// Children at random.
-pub(crate) fn plan<const N: usize>(bvh: &WideTree<N>) -> SlotOrder {
-    let mut slots = Vec::with_capacity(bvh.nodes.len() * N);
-    for (index, node) in bvh.nodes.iter().enumerate() {
+pub(crate) fn plan(tree: &Tree) -> SlotOrder {
+    let mut planned = SlotOrder::as_built(tree.shape());
+    for (index, node) in tree.nodes.iter().enumerate() {
         let mut state = hash::mixed(SEED ^ index as u64);
-        let mut order: [u8; N] = core::array::from_fn(|slot| slot as u8);
+        let mut order = AS_THEY_ARE;
         // Fisher and Yates.
         for last in (1..node.len()).rev() {
             state = state.wrapping_add(hash::STEP);
             order.swap(last, (hash::mixed(state) % (last as u64 + 1)) as usize);
         }
-        slots.extend(order);
+        planned.push(&order);
     }
-    SlotOrder {
-        slots,
-        ..SlotOrder::as_built(bvh.shape())
-    }
+    planned
 }
 
 #[cfg(test)]
@@ -35,7 +31,6 @@ mod tests {
     use crate::builder::Builder;
     use crate::geometry::Geometry;
     use crate::geometry::primitives::Primitives;
-    use crate::tree::any::Tree;
     use crate::tree::binary::BinaryTree;
     use crate::tree::width::Width;
     use crate::{Bvh, Isa};
@@ -55,14 +50,11 @@ mod tests {
             Width::W4,
             Isa::best(),
         );
-        let Tree::W4(bvh) = &bvh.tree else {
-            unreachable!("4 wide")
-        };
-        let order = plan(bvh);
-        assert_eq!(order, plan(bvh));
+        let order = plan(&bvh.tree);
+        assert_eq!(order, plan(&bvh.tree));
         let mut counts = [[0u32; 4]; 4];
         let mut full = 0;
-        for (node, slots) in bvh.nodes.iter().zip(order.slots.as_chunks::<4>().0) {
+        for (node, slots) in bvh.tree.nodes.iter().zip(order.slots.as_chunks::<4>().0) {
             if node.len() == 4 {
                 full += 1;
                 for (slot, from) in slots.iter().enumerate() {

@@ -7,7 +7,7 @@
 
 use alloc::vec::Vec;
 
-use crate::collapse::skeleton::{Children, Contraction, ForVisits};
+use crate::collapse::skeleton::{Children, Contraction};
 use crate::tree::binary::BinaryTree;
 
 /// How often each binary node is visited.
@@ -15,18 +15,19 @@ pub(crate) struct RscCollapse {
     visits: Vec<f32>,
 }
 
-impl<const N: usize> ForVisits<N> for RscCollapse {
-    fn for_visits(_: &BinaryTree, visits: &[f32]) -> Self {
+impl RscCollapse {
+    /// For rays that visit each inner binary node so often.
+    pub fn new(visits: &[f32]) -> Self {
         Self {
             visits: visits.to_vec(),
         }
     }
 }
 
-impl<const N: usize> Contraction<N> for RscCollapse {
-    fn children(&self, tree: &BinaryTree, binary: usize) -> Children<N> {
+impl Contraction for RscCollapse {
+    fn children(&self, tree: &BinaryTree, binary: usize, width: usize) -> Children {
         let mut children = Children::new(binary);
-        while children.len() < N {
+        while children.len() < width {
             // The first of equals.
             let mut most: Option<(f32, usize, [usize; 2])> = None;
             for (place, &node) in children.as_slice().iter().enumerate() {
@@ -69,9 +70,9 @@ mod tests {
                 visits[child] = visits[node] * rng.unit();
             }
         }
-        let collapse: RscCollapse = ForVisits::<8>::for_visits(&tree, &visits);
+        let collapse = RscCollapse::new(&visits);
         for node in 0..tree.nodes.len() {
-            let children: Children<8> = collapse.children(&tree, node);
+            let children = collapse.children(&tree, node, 8);
             let children: Vec<_> = children
                 .as_slice()
                 .iter()

@@ -35,27 +35,28 @@
 use alloc::vec;
 
 use crate::aabb::Aabb;
+use crate::order::AS_THEY_ARE;
 use crate::order::arrange::{Costs, arrange};
 use crate::order::ratio::area_shares;
 use crate::tree::costs::CostModel;
-use crate::tree::node::{ChildKind, Node};
+use crate::tree::node::{ChildKind, MAX_WIDTH, NodeRef, PerSlot};
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 
 /// The order of least cost for uniform rays.
-pub(crate) fn plan<const N: usize>(bvh: &WideTree<N>, model: &CostModel) -> SlotOrder {
-    let mut slots = vec![0; bvh.nodes.len() * N];
+pub(crate) fn plan(tree: &Tree, model: &CostModel) -> SlotOrder {
+    let mut planned = SlotOrder::of_nodes(tree.shape());
     // `C` and `V` of every node.
-    let mut known = vec![(0.0, 1.0); bvh.nodes.len()];
+    let mut known = vec![(0.0, 1.0); tree.nodes.len()];
     // Children follow their parents, so going backwards visits them first.
-    for (index, node) in bvh.nodes.iter().enumerate().rev() {
-        let (mut costs, mut pass) = ([0.0; N], [0.0; N]);
+    for (index, node) in tree.nodes.iter().enumerate().rev() {
+        let [mut costs, mut pass] = [[0.0; MAX_WIDTH]; 2];
         for slot in 0..node.len() {
             (costs[slot], pass[slot]) = match node.child(slot).kind() {
                 ChildKind::Inner(child) => known[child],
-                ChildKind::Leaf(leaf) => (bvh.leaf_cost(leaf, model), 0.0),
+                ChildKind::Leaf(leaf) => (tree.leaf_cost(leaf, model), 0.0),
                 ChildKind::Instance(instance) => {
-                    let (cost, pass) = known[bvh.instances[instance].root as usize];
+                    let (cost, pass) = known[tree.instances[instance].root as usize];
                     (f64::from(model.entry) + cost, pass)
                 }
             };
@@ -63,15 +64,13 @@ pub(crate) fn plan<const N: usize>(bvh: &WideTree<N>, model: &CostModel) -> Slot
         let children = Uniform::new(node, costs, pass);
         let order = arrange(node.len(), &children);
         known[index] = children.of_parent(&order, f64::from(model.node));
-        let own = &mut slots[index * N..][..N];
-        for (slot, place) in own.iter_mut().enumerate() {
-            *place = order.get(slot).map_or(slot, |from| *from) as u8;
+        let mut slots = AS_THEY_ARE;
+        for (place, from) in slots.iter_mut().zip(order) {
+            *place = from as u8;
         }
+        planned.set(index, &slots);
     }
-    SlotOrder {
-        slots,
-        ..SlotOrder::as_built(bvh.shape())
-    }
+    planned
 }
 
 /// Children of a node among uniform rays.
@@ -86,12 +85,11 @@ struct Uniform<const N: usize> {
     pass: [f64; N],
 }
 
-impl<const N: usize> Uniform<N> {
-    fn new(node: &Node<N>, costs: [f64; N], pass: [f64; N]) -> Self {
+impl Uniform<MAX_WIDTH> {
+    fn new(node: NodeRef<'_>, costs: PerSlot<f64>, pass: PerSlot<f64>) -> Self {
         let all = node.all_bounds();
-        let areas = core::array::from_fn(|slot| node.bounds(slot).half_area());
-        let enter = area_shares(&areas, all.half_area());
-        let mut both = [[0.0; N]; N];
+        let enter = area_shares(&node.areas(), all.half_area());
+        let mut both = [[0.0; MAX_WIDTH]; MAX_WIDTH];
         for i in 0..node.len() {
             for j in 0..i {
                 let boxes = [node.bounds(i), node.bounds(j)];
@@ -106,7 +104,9 @@ impl<const N: usize> Uniform<N> {
             pass,
         }
     }
+}
 
+impl<const N: usize> Uniform<N> {
     /// `E_i`: the chance of entering a child and not being stopped by those before it.
     fn reach(&self, child: usize, before: u32) -> f64 {
         let mut reach = self.enter[child];

@@ -92,6 +92,7 @@ impl<'a> Steps<'a> {
                 ChildKind::Inner(index) => {
                     self.at_nodes.push(visit);
                     let node = &tree.nodes[index];
+                    let node = node.any();
                     for slot in (0..node.len()).rev() {
                         if hits_box(setup, &node.bounds(slot)) {
                             pending.push(node.child(slot));
@@ -174,7 +175,7 @@ fn stacks<'a, T: Stored, const N: usize>(memory: &'a mut Memory, bvh: &WideTree<
 }
 
 struct SetUp<'a, const N: usize> {
-    bvh: &'a WideTree<N>,
+    bvh: &'a WideTree<'a, N>,
     rays: &'a [Ray],
     setups: &'a mut [RaySetup],
 }
@@ -193,7 +194,7 @@ impl<const N: usize> WithSimd<N> for SetUp<'_, N> {
 }
 
 struct NodeSteps<'a, Q: StreamQuery, const N: usize> {
-    bvh: &'a WideTree<N>,
+    bvh: &'a WideTree<'a, N>,
     items: &'a mut [Q::Item],
     rays: &'a [Ray],
     setups: &'a [RaySetup],
@@ -223,7 +224,7 @@ impl<Q: StreamQuery, const N: usize> WithSimd<N> for NodeSteps<'_, Q, N> {
 }
 
 struct LeafSteps<'a, Q: StreamQuery, const N: usize> {
-    bvh: &'a WideTree<N>,
+    bvh: &'a WideTree<'a, N>,
     items: &'a mut [Q::Item],
     rays: &'a [Ray],
     setups: &'a [RaySetup],

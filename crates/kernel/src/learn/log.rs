@@ -15,7 +15,7 @@ use crate::learn::ray_log::RayLog;
 use crate::ray::Ray;
 use crate::shape::Shape;
 use crate::trace::observe::{Counting, NodeVisit, Observer, Place};
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 
 /// The amount of detail in a log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -83,18 +83,18 @@ pub struct Log {
 }
 
 impl Log {
-    pub(crate) fn new<const N: usize>(bvh: &WideTree<N>, kind: LogKind, seed: u64) -> Self {
-        let (nodes, leaves) = (bvh.nodes.len(), bvh.leaf_count());
+    pub(crate) fn new(tree: &Tree, kind: LogKind, seed: u64) -> Self {
+        let (nodes, leaves) = (tree.nodes.len(), tree.leaf_count());
         let boxes = if kind.boxes { nodes } else { 0 };
-        let ends = leaves + bvh.instances.len();
+        let ends = leaves + tree.instances.len();
         Self {
             kind,
             seed,
-            shape: bvh.shape(),
+            shape: tree.shape(),
             rays: 0,
             occluded: 0,
             node_entered: vec![0; boxes],
-            lane_hits: vec![0; boxes * N],
+            lane_hits: vec![0; boxes * tree.width().lanes()],
             leaf_entered: vec![0; if kind.boxes { ends } else { 0 }],
             prim_hits: vec![[0; BLOCK]; ends],
             masks: kind.masks.then(RayLog::default),
@@ -185,7 +185,7 @@ impl Log {
         self.leaf_entered.get(leaf).copied().unwrap_or(0)
     }
 
-    /// Rays that ended at each primitive of a leaf, or in an instance: see [`WideTree::instance_index`].
+    /// Rays that ended at each primitive of a leaf, or in an instance: see [`Tree::instance_index`].
     pub(crate) fn prim_hits(&self, leaf: usize) -> &[u32; BLOCK] {
         &self.prim_hits[leaf]
     }
@@ -276,7 +276,6 @@ mod tests {
     use crate::geometry::{Geometry, Instance};
     use crate::ray::Ray;
     use crate::trace::observe::Cost;
-    use crate::tree::any::Tree;
     use crate::tree::binary::BinaryTree;
     use crate::tree::node::ChildKind;
     use crate::tree::width::Width;
@@ -325,9 +324,7 @@ mod tests {
             let ended = occluded.iter().filter(|occluded| **occluded).count() as u64;
             assert_eq!(log.occluded(), ended);
 
-            let Tree::W8(bvh) = &bvh.tree else {
-                unreachable!("8 wide")
-            };
+            let tree = &bvh.tree;
             let hits = |leaf: usize| {
                 log.prim_hits(leaf)
                     .iter()
@@ -336,8 +333,8 @@ mod tests {
             };
             // In the world, in instances, in the object.
             let mut sums = [0; 3];
-            for (index, node) in bvh.nodes.iter().enumerate() {
-                let in_object = index >= bvh.top_nodes();
+            for (index, node) in tree.nodes.iter().enumerate() {
+                let in_object = index >= tree.top_nodes();
                 for slot in 0..node.len() {
                     match node.child(slot).kind() {
                         ChildKind::Inner(_) => {}
@@ -345,7 +342,7 @@ mod tests {
                             assert_eq!(leaf.kind, PrimKind::Triangle);
                             sums[if in_object { 2 } else { 0 }] += hits(leaf.index);
                         }
-                        ChildKind::Instance(index) => sums[1] += hits(bvh.instance_index(index)),
+                        ChildKind::Instance(index) => sums[1] += hits(tree.instance_index(index)),
                     }
                 }
             }

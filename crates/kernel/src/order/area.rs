@@ -3,18 +3,15 @@
 //! Source: Nah and Manocha (2014), "SATO: Surface Area Traversal Order for Shadow Ray Tracing".
 
 use crate::order::sorted_slots;
+use crate::tree::node::MAX_WIDTH;
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 
 /// Larger boxes first.
-pub(crate) fn plan<const N: usize>(bvh: &WideTree<N>) -> SlotOrder {
-    let slots = bvh
-        .nodes
-        .iter()
-        .flat_map(|node| sorted_slots(node, &[0.0; N]))
-        .collect();
-    SlotOrder {
-        slots,
-        ..SlotOrder::as_built(bvh.shape())
+pub(crate) fn plan(tree: &Tree) -> SlotOrder {
+    let mut order = SlotOrder::as_built(tree.shape());
+    for node in tree.nodes.iter() {
+        order.push(&sorted_slots(node, &[0.0; MAX_WIDTH]));
     }
+    order
 }

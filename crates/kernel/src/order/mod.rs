@@ -20,9 +20,9 @@ mod worked_example;
 use crate::error::Error;
 use crate::learn::{Log, LogKind};
 use crate::tree::costs::CostModel;
-use crate::tree::node::Node;
+use crate::tree::node::{NodeRef, PerSlot};
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 use antumbra_simd::named_list;
 
 use ratio::Estimate;
@@ -71,10 +71,16 @@ named_list! {
         #[default]
         Joint = "joint",
             "Least measured cost of the training rays; children need not be independent",
-            // Masks are equal whether shuffled or not; shuffled, `sort+` can share the log.
-            None, Properties::learns(LogKind { boxes: true, shuffled: true, masks: true });
+            None, Properties::learns(MASKS);
     }
 }
+
+/// What `joint` and its relatives log. Masks are equal whether shuffled or not; shuffled, `sort+` can share the log.
+const MASKS: LogKind = LogKind {
+    boxes: true,
+    shuffled: true,
+    masks: true,
+};
 
 /// Columns of the table of orders.
 pub(crate) struct Properties {
@@ -118,8 +124,8 @@ impl Order {
 }
 
 /// Computes an order for a tree whose slots are as its builder left them.
-pub(crate) fn plan<const N: usize>(
-    bvh: &WideTree<N>,
+pub(crate) fn plan(
+    tree: &Tree,
     order: Order,
     log: Option<&Log>,
     model: &CostModel,
@@ -134,32 +140,27 @@ pub(crate) fn plan<const N: usize>(
         }
     };
     match order {
-        Order::Simple => Ok(SlotOrder::as_built(bvh.shape())),
-        Order::Sato => Ok(area::plan(bvh)),
-        Order::Embree => Ok(size::plan(bvh)),
-        Order::SortMinus => ratio::plan(bvh, needed()?, model, Estimate::Poor),
-        Order::Sort | Order::SortPlus => ratio::plan(bvh, with_boxes()?, model, Estimate::Precise),
-        Order::Visits => ratio::plan(bvh, with_boxes()?, model, Estimate::Visited),
-        Order::Joint => joint::plan(bvh, needed()?, model),
+        Order::Simple => Ok(SlotOrder::as_built(tree.shape())),
+        Order::Sato => Ok(area::plan(tree)),
+        Order::Embree => Ok(size::plan(tree)),
+        Order::SortMinus => ratio::plan(tree, needed()?, model, Estimate::Poor),
+        Order::Sort | Order::SortPlus => ratio::plan(tree, with_boxes()?, model, Estimate::Precise),
+        Order::Visits => ratio::plan(tree, with_boxes()?, model, Estimate::Visited),
+        Order::Joint => joint::plan(tree, needed()?, model),
         #[cfg(feature = "lab")]
-        order => Ok(crate::lab::orders::plan(bvh, order, model)),
+        order => Ok(crate::lab::orders::plan(tree, order, model)),
     }
 }
 
 /// Sorts the occupied slots of a node by falling `key`, equal keys by falling area, then by slot.
 /// Keys are not NaN.
-pub(crate) fn sorted_slots<const N: usize>(node: &Node<N>, key: &[f64; N]) -> [u8; N] {
-    let areas = core::array::from_fn(|slot| node.bounds(slot).half_area());
-    sorted_by_key(node.len(), key, &areas)
+pub(crate) fn sorted_slots(node: NodeRef<'_>, key: &PerSlot<f64>) -> PerSlot<u8> {
+    sorted_by_key(node.len(), key, &node.areas())
 }
 
 /// [`sorted_slots`] for `len` occupied slots whose boxes have these areas.
-pub(crate) fn sorted_by_key<const N: usize>(
-    len: usize,
-    key: &[f64; N],
-    areas: &[f32; N],
-) -> [u8; N] {
-    let mut slots: [u8; N] = core::array::from_fn(|slot| slot as u8);
+pub(crate) fn sorted_by_key(len: usize, key: &PerSlot<f64>, areas: &PerSlot<f32>) -> PerSlot<u8> {
+    let mut slots = AS_THEY_ARE;
     slots[..len].sort_by(|&a, &b| {
         let (a, b) = (a as usize, b as usize);
         key[b]
@@ -168,3 +169,6 @@ pub(crate) fn sorted_by_key<const N: usize>(
     });
     slots
 }
+
+/// Every slot in its place.
+pub(crate) const AS_THEY_ARE: PerSlot<u8> = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];

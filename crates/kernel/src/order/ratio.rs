@@ -29,15 +29,16 @@
 //!   children by area, with chances by area and no hits.
 
 use alloc::vec;
+use alloc::vec::Vec;
 
 use crate::error::Error;
 use crate::geometry::BLOCK;
 use crate::learn::log::Log;
-use crate::order::sorted_slots;
+use crate::order::{AS_THEY_ARE, sorted_slots};
 use crate::tree::costs::CostModel;
-use crate::tree::node::{ChildKind, Node};
+use crate::tree::node::{ChildKind, MAX_WIDTH, NodeRef, PerSlot};
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 
 /// Weight of the area prior, in rays.
 const PRIOR: f64 = 1.0;
@@ -113,52 +114,52 @@ pub(crate) fn cost_any(node: f64, children: impl IntoIterator<Item = ChildCost>)
 }
 
 /// The learned order.
-pub(crate) fn plan<const N: usize>(
-    bvh: &WideTree<N>,
+pub(crate) fn plan(
+    tree: &Tree,
     log: &Log,
     model: &CostModel,
     estimate: Estimate,
 ) -> Result<SlotOrder, Error> {
-    Error::unless_fits(log.shape(), bvh.shape())?;
-    let mut slots = vec![0; bvh.nodes.len() * N];
-    walk(bvh, log, model, estimate, |index, node, children| {
+    Error::unless_fits(log.shape(), tree.shape())?;
+    let mut planned = SlotOrder::of_nodes(tree.shape());
+    walk(tree, log, model, estimate, |index, node, children| {
         let order = sorted_slots(node, &children.map(|child| child.key()));
-        slots[index * N..][..N].copy_from_slice(&order);
+        planned.set(index, &order);
         order
     });
-    let lanes = (0..bvh.leaf_count())
-        .map(|leaf| sorted_lanes(log.prim_hits(leaf)))
-        .collect();
-    Ok(SlotOrder {
-        slots,
-        lanes,
-        ..SlotOrder::as_built(bvh.shape())
-    })
+    planned.lanes = all_sorted_lanes(tree, log);
+    Ok(planned)
 }
 
 /// `C_any` of the root with the slots as `order` would put them. An order that picks at run time is
 /// costed as the slots are: the model does not know distances.
-pub(crate) fn predicted_cost<const N: usize>(
-    bvh: &WideTree<N>,
+pub(crate) fn predicted_cost(
+    tree: &Tree,
     log: &Log,
     model: &CostModel,
     order: Option<&SlotOrder>,
 ) -> Result<f64, Error> {
-    Error::unless_fits(log.shape(), bvh.shape())?;
+    Error::unless_fits(log.shape(), tree.shape())?;
     let slots = match order {
         Some(order) => {
-            Error::unless_fits(order.shape, bvh.shape())?;
+            Error::unless_fits(order.shape, tree.shape())?;
             &order.slots[..]
         }
         None => &[],
     };
-    let (permutations, _) = slots.as_chunks::<N>();
-    Ok(walk(bvh, log, model, Estimate::of(log), |index, _, _| {
-        permutations
-            .get(index)
-            .copied()
-            .unwrap_or_else(|| core::array::from_fn(|slot| slot as u8))
-    }))
+    Ok(walk(
+        tree,
+        log,
+        model,
+        Estimate::of(log),
+        |index, node, _| {
+            let mut order = AS_THEY_ARE;
+            if let Some(slots) = slots.chunks(node.width()).nth(index) {
+                order[..slots.len()].copy_from_slice(slots);
+            }
+            order
+        },
+    ))
 }
 
 /// Primitives that ended more rays first. The empty lanes, which ended none, stay last: sorting is
@@ -169,35 +170,43 @@ pub(crate) fn sorted_lanes(hits: &[u32; BLOCK]) -> [u8; BLOCK] {
     lanes
 }
 
+/// [`sorted_lanes`] of all leaves.
+pub(crate) fn all_sorted_lanes(tree: &Tree, log: &Log) -> Vec<[u8; BLOCK]> {
+    let leaves = 0..tree.leaf_count();
+    leaves
+        .map(|leaf| sorted_lanes(log.prim_hits(leaf)))
+        .collect()
+}
+
 /// Goes through the nodes bottom-up, gets the visiting order of each from `order`, and returns the cost of the root.
-fn walk<const N: usize>(
-    bvh: &WideTree<N>,
+fn walk(
+    tree: &Tree,
     log: &Log,
     model: &CostModel,
     estimate: Estimate,
-    mut order: impl FnMut(usize, &Node<N>, &[ChildCost; N]) -> [u8; N],
+    mut order: impl FnMut(usize, NodeRef<'_>, &PerSlot<ChildCost>) -> PerSlot<u8>,
 ) -> f64 {
-    let mut costs = vec![0.0; bvh.nodes.len()];
-    let mut hits = vec![0u64; bvh.nodes.len()];
+    let mut costs = vec![0.0; tree.nodes.len()];
+    let mut hits = vec![0u64; tree.nodes.len()];
     // Children follow their parents, so going backwards visits them first.
-    for (index, node) in bvh.nodes.iter().enumerate().rev() {
-        let mut child_hits = [0u64; N];
-        let mut child_visits = [0u32; N];
-        let mut child_costs = [0.0; N];
+    for (index, node) in tree.nodes.iter().enumerate().rev() {
+        let mut child_hits = [0u64; MAX_WIDTH];
+        let mut child_visits = [0u32; MAX_WIDTH];
+        let mut child_costs = [0.0; MAX_WIDTH];
         for slot in 0..node.len() {
             (child_hits[slot], child_costs[slot]) = match node.child(slot).kind() {
                 ChildKind::Inner(child) => (hits[child], costs[child]),
                 ChildKind::Leaf(leaf) => (
-                    log.prim_hits(bvh.leaf_index(leaf))
+                    log.prim_hits(tree.leaf_index(leaf))
                         .iter()
                         .map(|hits| u64::from(*hits))
                         .sum(),
-                    bvh.leaf_cost(leaf, model),
+                    tree.leaf_cost(leaf, model),
                 ),
                 ChildKind::Instance(instance) => {
-                    let root = bvh.instances[instance].root as usize;
+                    let root = tree.instances[instance].root as usize;
                     (
-                        u64::from(log.prim_hits(bvh.instance_index(instance))[0]),
+                        u64::from(log.prim_hits(tree.instance_index(instance))[0]),
                         f64::from(model.entry) + costs[root],
                     )
                 }
@@ -207,8 +216,8 @@ fn walk<const N: usize>(
         for (slot, visits) in child_visits.iter_mut().enumerate().take(node.len()) {
             *visits = match node.child(slot).kind() {
                 ChildKind::Inner(child) => log.node_entered(child),
-                ChildKind::Leaf(leaf) => log.leaf_entered(bvh.leaf_index(leaf)),
-                ChildKind::Instance(instance) => log.leaf_entered(bvh.instance_index(instance)),
+                ChildKind::Leaf(leaf) => log.leaf_entered(tree.leaf_index(leaf)),
+                ChildKind::Instance(instance) => log.leaf_entered(tree.instance_index(instance)),
             };
         }
         let mut children = chances(node, index, log, estimate, &child_hits, &child_visits);
@@ -218,31 +227,31 @@ fn walk<const N: usize>(
         let order = order(index, node, &children);
         costs[index] = cost_any(
             f64::from(model.node),
-            order.map(|slot| children[slot as usize]),
+            order[..node.len()]
+                .iter()
+                .map(|slot| children[usize::from(*slot)]),
         );
     }
     costs[0]
 }
 
 /// `I` and `H` of the children of a node; costs are left at 0.
-fn chances<const N: usize>(
-    node: &Node<N>,
+fn chances(
+    node: NodeRef<'_>,
     index: usize,
     log: &Log,
     estimate: Estimate,
-    child_hits: &[u64; N],
-    child_visits: &[u32; N],
-) -> [ChildCost; N] {
+    child_hits: &PerSlot<u64>,
+    child_visits: &PerSlot<u32>,
+) -> PerSlot<ChildCost> {
     let len = node.len();
-    let areas = core::array::from_fn(|slot| node.bounds(slot).half_area());
-    let all = (0..len).fold(crate::Aabb::EMPTY, |all, slot| {
-        all.union(&node.bounds(slot))
-    });
-    let shares = area_shares(&areas, all.half_area());
+    let shares = area_shares(&node.areas(), node.all_bounds().half_area());
     let entered = f64::from(log.node_entered(index));
     let hits = child_hits.map(|hits| hits as f64);
-    let box_hits: [f64; N] =
-        core::array::from_fn(|slot| f64::from(log.lane_hits(index, Node::<N>::lane(slot))));
+    let mut box_hits = [0.0; MAX_WIDTH];
+    for (slot, hits) in box_hits.iter_mut().enumerate().take(len) {
+        *hits = f64::from(log.lane_hits(index, node.lane(slot)));
+    }
     match estimate {
         Estimate::Precise => precise_chances(len, entered, &box_hits, &hits, &shares),
         Estimate::Visited => visited_chances(
@@ -330,8 +339,6 @@ pub(crate) fn visited_chances<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use alloc::vec::Vec;
-
     use super::*;
     use antumbra_testkit::{Rng, permutations};
 

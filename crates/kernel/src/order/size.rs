@@ -5,30 +5,27 @@
 use alloc::vec;
 
 use crate::order::sorted_slots;
-use crate::tree::node::ChildKind;
+use crate::tree::node::{ChildKind, MAX_WIDTH};
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 
 /// Subtrees with fewer primitives first.
-pub(crate) fn plan<const N: usize>(bvh: &WideTree<N>) -> SlotOrder {
-    let mut counts = vec![0usize; bvh.nodes.len()];
-    let mut slots = vec![0; bvh.nodes.len() * N];
+pub(crate) fn plan(tree: &Tree) -> SlotOrder {
+    let mut counts = vec![0usize; tree.nodes.len()];
+    let mut order = SlotOrder::of_nodes(tree.shape());
     // Children follow their parents, so going backwards visits them first.
-    for (index, node) in bvh.nodes.iter().enumerate().rev() {
-        let mut key = [0.0; N];
+    for (index, node) in tree.nodes.iter().enumerate().rev() {
+        let mut key = [0.0; MAX_WIDTH];
         for (slot, key) in key.iter_mut().enumerate().take(node.len()) {
             let count = match node.child(slot).kind() {
                 ChildKind::Inner(child) => counts[child],
-                ChildKind::Leaf(leaf) => bvh.leaf_len(leaf),
+                ChildKind::Leaf(leaf) => tree.leaf_len(leaf),
                 ChildKind::Instance(_) => 1,
             };
             counts[index] += count;
             *key = -(count as f64);
         }
-        slots[index * N..][..N].copy_from_slice(&sorted_slots(node, &key));
+        order.set(index, &sorted_slots(node, &key));
     }
-    SlotOrder {
-        slots,
-        ..SlotOrder::as_built(bvh.shape())
-    }
+    order
 }

@@ -6,14 +6,15 @@ use alloc::vec::Vec;
 
 // ANCHOR: order
 use crate::order::sorted_slots;
+use crate::tree::node::MAX_WIDTH;
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 
 /// Flat boxes first: children sorted by how much thinner they are than wide.
-fn plan<const N: usize>(bvh: &WideTree<N>) -> SlotOrder {
-    let mut order = SlotOrder::as_built(bvh.shape());
-    for node in &bvh.nodes {
-        let mut flatness = [0.0; N];
+fn plan(tree: &Tree) -> SlotOrder {
+    let mut order = SlotOrder::as_built(tree.shape());
+    for node in tree.nodes.iter() {
+        let mut flatness = [0.0; MAX_WIDTH];
         for (slot, key) in flatness.iter_mut().enumerate().take(node.len()) {
             let bounds = node.bounds(slot);
             let mut sides: [f32; 3] = core::array::from_fn(|i| bounds.max[i] - bounds.min[i]);
@@ -21,9 +22,7 @@ fn plan<const N: usize>(bvh: &WideTree<N>) -> SlotOrder {
             // Never NaN, not even for a point.
             *key = f64::from(sides[2] / sides[0].max(1e-30));
         }
-        order
-            .slots
-            .extend_from_slice(&sorted_slots(node, &flatness));
+        order.push(&sorted_slots(node, &flatness));
     }
     order
 }
@@ -32,7 +31,6 @@ fn plan<const N: usize>(bvh: &WideTree<N>) -> SlotOrder {
 // ANCHOR: test
 #[test]
 fn flat_boxes_first_changes_no_answer() {
-    use crate::tree::any::Tree;
     use crate::{Bvh, Geometry, Ray};
     use antumbra_testkit::{Rng, mesh};
 
@@ -41,12 +39,7 @@ fn flat_boxes_first_changes_no_answer() {
     let geometry = [Geometry::triangles(&soup.positions[..], &soup.indices[..])];
     let built = Bvh::build(&geometry, &Default::default()).expect("indices in range");
     let mut ordered = built.clone();
-    let order = match &built.tree {
-        Tree::W4(bvh) => plan(bvh),
-        Tree::W8(bvh) => plan(bvh),
-        Tree::W16(bvh) => plan(bvh),
-    };
-    ordered.apply(&order);
+    ordered.apply(&plan(&built.tree));
     ordered.validate().expect("a sound tree");
 
     let rays: Vec<Ray> = (0..2000)

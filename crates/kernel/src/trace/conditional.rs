@@ -26,7 +26,7 @@ use crate::tree::wide::WideTree;
 /// Occlusion of a ray by hits that fulfil a condition. The occluder is the first that is found, which depends on the
 /// tree.
 pub(crate) struct Conditional<'a, const N: usize> {
-    pub bvh: &'a WideTree<N>,
+    pub bvh: &'a WideTree<'a, N>,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [u32],
     pub ray: &'a Ray,

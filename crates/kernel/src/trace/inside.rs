@@ -102,8 +102,8 @@ impl Met {
         stack.push(root as u32);
         while let Some(index) = stack.pop() {
             let node = &tree.nodes[index as usize];
-            for slot in (0..node.len()).filter(|slot| is_met(node, *slot, point)) {
-                match node.child(slot).kind() {
+            for slot in (0..node.any().len()).filter(|slot| is_met(node, *slot, point)) {
+                match node.any().child(slot).kind() {
                     ChildKind::Inner(index) => stack.push(index as u32),
                     ChildKind::Leaf(leaf) => on_leaf!(tree, leaf, block => self.add(block, point)),
                     ChildKind::Instance(index) => instances.push(index),

@@ -25,7 +25,7 @@ pub(crate) struct Open {
 
 /// Occlusion of `rays` one by one; `answers` is as long.
 pub(crate) struct Instrumented<'a, const N: usize> {
-    pub bvh: &'a WideTree<N>,
+    pub bvh: &'a WideTree<'a, N>,
     /// Memory of a stack.
     pub stack: &'a mut Vec<Open>,
     pub pick: Pick,
@@ -91,8 +91,10 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
                     from,
                     lanes: mask.bits(),
                     width: N,
+                    ray,
                 });
-                let (lanes, count) = pick.lanes::<N, NodeLanes<S, N>>(bvh.pick, mask, entry);
+                let hit = (mask, entry);
+                let (lanes, count) = pick.lanes::<N, NodeLanes<S, N>>(bvh, hit);
                 for &lane in &lanes[..count] {
                     let slot = N as u32 - 1 - lane;
                     stack.push(Open {
@@ -154,7 +156,7 @@ mod tests {
 
     /// Checks every place that is reported to it against the tree.
     struct Check<'a> {
-        bvh: &'a WideTree<8>,
+        bvh: &'a WideTree<'a, 8>,
         goes_on: bool,
         /// Nodes visited by the current ray.
         nodes: Vec<usize>,
@@ -181,7 +183,7 @@ mod tests {
             self.goes_on
         }
 
-        fn node(&mut self, visit: &NodeVisit) -> u32 {
+        fn node(&mut self, visit: &NodeVisit<'_>) -> u32 {
             if visit.from == Place::NONE {
                 assert_eq!(
                     (visit.node, self.nodes.len()),

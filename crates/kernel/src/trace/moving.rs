@@ -20,6 +20,7 @@ use crate::trace::ray_batch::RayBatch;
 use crate::trace::single::traverse;
 use crate::trace::stack::Stack;
 use crate::trace::step::{NodeLanes, NodeMask, NodeTest};
+use crate::tree::motion::planes_at;
 use crate::tree::node::Leaf;
 use crate::tree::wide::WideTree;
 
@@ -196,15 +197,12 @@ impl<Q: BlockQuery> Query for Moving<Q> {
         limit: f32,
     ) -> (NodeMask<S, N>, NodeLanes<S, N>) {
         let node = &bvh.nodes[index];
-        match bvh
-            .motion
-            .as_deref()
-            .and_then(|motion| motion.nodes.get(index))
-        {
+        match bvh.moves.get(index) {
             None => test.step(simd, &node.planes, limit),
             Some(moved) => {
                 let share = NodeLanes::<S, N>::splat(simd, timed.share);
-                let at = |axis: usize, side: usize| moved.at(simd, node, (axis, side), share);
+                let at =
+                    |axis: usize, side: usize| planes_at(simd, [node, moved], (axis, side), share);
                 let [x, y, z] = [
                     test.near[0] as usize,
                     test.near[1] as usize,
@@ -221,9 +219,7 @@ impl<Q: BlockQuery> Query for Moving<Q> {
     #[inline(always)]
     fn prefetch<S: Simd, const N: usize>(simd: S, bvh: &WideTree<N>, index: usize) {
         simd.prefetch_at(bvh.nodes.as_ptr().wrapping_add(index));
-        if let Some(motion) = bvh.motion.as_deref() {
-            simd.prefetch_at(motion.nodes.as_ptr().wrapping_add(index));
-        }
+        simd.prefetch_at(bvh.moves.as_ptr().wrapping_add(index));
     }
 
     #[inline(always)]
@@ -354,7 +350,7 @@ impl<Q: BlockQuery> StreamQuery for Moving<Q> {
 
 /// Answers rays one by one, each at its time.
 pub(crate) struct SingleMoving<'a, Q: BlockQuery, const N: usize> {
-    pub bvh: &'a WideTree<N>,
+    pub bvh: &'a WideTree<'a, N>,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [Q::Item],
     pub batch: &'a RayBatch<'a>,

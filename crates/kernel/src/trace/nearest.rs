@@ -296,7 +296,7 @@ fn norm(affine: &Affine) -> f64 {
 
 /// Visits everything in a tree that may be near enough to a point, which is finite.
 pub(crate) struct Search<'a, const N: usize> {
-    pub tree: &'a WideTree<N>,
+    pub tree: &'a WideTree<'a, N>,
     pub point: [f32; 3],
     pub memory: &'a mut Memory,
     pub seeker: &'a mut dyn Seeker,
@@ -433,10 +433,10 @@ fn outside<const L: usize, V: Lanes<L>>(token: V::Token, [low, high]: &[[f32; L]
 
 /// The triangles of a leaf, if it has any.
 #[inline(always)]
-fn triangles_of<const N: usize>(
-    tree: &WideTree<N>,
+fn triangles_of<'a, const N: usize>(
+    tree: &'a WideTree<'_, N>,
     Leaf { kind, index }: Leaf,
-) -> Option<&TriangleBlock> {
+) -> Option<&'a TriangleBlock> {
     match kind {
         PrimKind::Triangle => Some(&tree.blocks.triangles[index]),
         PrimKind::Cutout => Some(&tree.blocks.cutouts[index].triangles),

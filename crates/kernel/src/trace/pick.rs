@@ -9,7 +9,9 @@ use crate::hash;
 use crate::ray::Ray;
 use crate::trace::stack::{Item, Stack};
 use crate::tree::node::{Child, Node};
+#[cfg(feature = "lab")]
 use crate::tree::rule::Rule;
+use crate::tree::wide::WideTree;
 
 /// Items of a stack know the order of the children that are pushed.
 pub(crate) trait Children: Item {
@@ -137,30 +139,24 @@ impl Pick {
         }
     }
 
-    /// The lanes of a node that a ray hit in a tree of this rule, the one to be visited first at the end, and how many they are. `mask`
+    /// The lanes of node `index` that `ray` hit, the one to be visited first at the end, and how many they are. `mask`
     /// are these lanes, `entry` the distances at which their boxes are entered.
     #[inline(always)]
     #[cfg_attr(
         not(feature = "lab"),
-        expect(unused_variables, reason = "slots need no distance")
+        expect(unused_variables, reason = "slots need no look at the ray")
     )]
     pub fn lanes<const N: usize, L: Lanes<N>>(
         &mut self,
-        rule: Rule,
-        mask: L::Mask,
-        entry: L,
+        bvh: &WideTree<N>,
+        (mask, entry): (L::Mask, L),
     ) -> ([u32; N], usize) {
+        #[cfg(feature = "lab")]
+        if let (Self::Rule, Rule::ByRay(rule)) = (&self, &bvh.pick) {
+            return rule.lanes(mask, entry);
+        }
         let all: [u32; N] = core::array::from_fn(|lane| lane as u32);
         let mut lanes = [0; N];
-        #[cfg(feature = "lab")]
-        if let (Self::Rule, Rule::Distance) = (&self, rule) {
-            let mut sorted = [0; N];
-            let count = entry.compress_sorted(mask, &all, &mut sorted);
-            for lane in 0..N {
-                lanes[lane] = sorted[lane] as u32;
-            }
-            return (lanes, count);
-        }
         let count = mask.compress(&all, &mut lanes);
         if let Self::Shuffled(shuffle) = self {
             shuffle.shuffle(&mut lanes[..count]);

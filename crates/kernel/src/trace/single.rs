@@ -14,7 +14,7 @@ use crate::tree::wide::WideTree;
 
 /// Answers `rays` one by one; `answers` is as long.
 pub(crate) struct Single<'a, Q: Query, const N: usize> {
-    pub bvh: &'a WideTree<N>,
+    pub bvh: &'a WideTree<'a, N>,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [Q::Item],
     pub rays: &'a [Ray],

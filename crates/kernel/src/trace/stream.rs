@@ -89,7 +89,7 @@ impl Iterator for Slots {
 /// The block of cut-outs that a slot goes on with.
 #[inline(always)]
 fn block<'a, const N: usize>(
-    bvh: &'a WideTree<N>,
+    bvh: &'a WideTree<'a, N>,
     next: &[u32; SLOTS],
     id: usize,
 ) -> &'a CutoutBlock {
@@ -98,7 +98,7 @@ fn block<'a, const N: usize>(
 
 /// Answers rays in a stream; `answers` is as long. A `CAREFUL` stream decides about every hit, or notes the leaves of hits.
 pub(crate) struct Stream<'a, Q: StreamQuery, const N: usize, const CAREFUL: bool> {
-    pub bvh: &'a WideTree<N>,
+    pub bvh: &'a WideTree<'a, N>,
     /// Memory of [`items`] items.
     pub items: &'a mut [Q::Item],
     /// Memory of [`SETUPS`] rays. What is in it does not matter.
@@ -274,7 +274,7 @@ fn report_surface<Q: StreamQuery>(
 /// one of them does not change another.
 struct Flight<'a, S, Q: StreamQuery, const N: usize, const CAREFUL: bool> {
     simd: S,
-    bvh: &'a WideTree<N>,
+    bvh: &'a WideTree<'a, N>,
     leaf_places: &'a LeafPlaces,
     prefetch: bool,
     batch: &'a RayBatch<'a>,

@@ -66,7 +66,7 @@ pub enum Visit {
 
 /// Visits the hits of `ray`. The output is the hit that was accepted.
 pub(crate) struct Visiting<'a, const N: usize> {
-    pub bvh: &'a WideTree<N>,
+    pub bvh: &'a WideTree<'a, N>,
     pub ahead: &'a mut Ahead,
     pub ray: &'a Ray,
     /// Instances in which nothing fulfils it are left out. Hits are the business of `visit`.

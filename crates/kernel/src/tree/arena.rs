@@ -10,16 +10,16 @@
 //! Objects are copied once, when they join. Their inner references are then indices among all nodes.
 
 use alloc::sync::Arc;
-use alloc::vec::Vec;
 use core::ops::Range;
 
 use antumbra_simd::memory::vec_in_huge_pages;
 
 use super::leaves::{LeafBlocks, first_block};
-use super::node::{Child, ChildKind, Leaf, Node};
+use super::node::{Child, ChildKind, Leaf};
+use super::nodes::Nodes;
 use super::refit::TreePlaces;
-use super::rule::Rule;
-use super::wide::{PlacedTree, WideTree};
+use super::wide::{PlacedTree, Tree};
+use super::width::Width;
 use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::geometry::cutout::join::Joined;
@@ -29,13 +29,12 @@ use crate::geometry::primitives::kinds::for_each_kind;
 use crate::geometry::triangle::TriangleBlock;
 
 /// A wide tree with trees in it that were built before.
-impl<const N: usize> WideTree<N> {
-    /// A tree over nothing with memory for all of these.
-    pub fn with_room_for(trees: &[&Self]) -> Self {
+impl Tree {
+    /// A tree over nothing with memory for all of these, which have its width.
+    pub fn with_room_for(width: Width, trees: &[&Self]) -> Self {
         let sum =
             |count: fn(&Self) -> usize| -> usize { trees.iter().map(|tree| count(tree)).sum() };
-        let mut nodes = vec_in_huge_pages(1 + sum(|tree| tree.nodes.len()));
-        nodes.push(Node::EMPTY);
+        let nodes = Nodes::with_capacity(width, 1 + sum(|tree| tree.nodes.len()));
         let mut blocks = LeafBlocks::default();
         macro_rules! make_room {
             ($(($Kind:ident, $list:ident, $Type:ty, $first:literal))*) => {
@@ -44,29 +43,23 @@ impl<const N: usize> WideTree<N> {
         }
         for_each_kind!([make_room]);
         blocks.triangles.push(TriangleBlock::EMPTY);
-        Self {
-            nodes,
-            blocks,
-            filters: Arc::default(),
-            instances: Vec::new(),
-            roots: Vec::new(),
-            bounds: Aabb::EMPTY,
-            reach: 0.0,
-            depth: 1,
-            pick: Rule::Slots,
-            motion: None,
-        }
+        Self::over_nothing(nodes, blocks)
     }
 
     /// Copies a tree without instances behind all others, and returns its place. Its filters belong to this object, or
     /// to the ground. The caller adds its root to the roots of objects.
     ///
     /// # Errors
-    /// More nodes or leaves than references can name; nothing has changed then.
+    /// Another width; more nodes or leaves than references can name. Nothing has changed then.
     pub fn join(&mut self, tree: &Self, object: Option<u32>) -> Result<TreePlaces, Error> {
+        if self.width() != tree.width() {
+            return Err(Error::OtherWidth {
+                expected: self.width().lanes(),
+                found: tree.width().lanes(),
+            });
+        }
         let places = self.places_of(tree)?;
         let relocated = |child: Child| match child.kind() {
-            _ if child == Child::EMPTY => child,
             ChildKind::Inner(index) => Child::inner(places.nodes.start + index),
             ChildKind::Leaf(Leaf { kind, index }) => Child::leaf(Leaf {
                 kind,
@@ -74,8 +67,10 @@ impl<const N: usize> WideTree<N> {
             }),
             ChildKind::Instance(_) => unreachable!("objects have no instances"),
         };
-        self.nodes
-            .extend(tree.nodes.iter().map(|node| node.relocated(relocated)));
+        self.nodes.extend_from(&tree.nodes);
+        for index in places.nodes.clone() {
+            self.nodes.get_mut(index).relocate(relocated);
+        }
         let mut joined = Joined::default();
         if !tree.filters.opacities.is_empty() {
             joined = match Arc::get_mut(&mut self.filters) {
@@ -128,19 +123,15 @@ impl<const N: usize> WideTree<N> {
     /// Moves all nodes from `first` on back by so many places, and puts empty ones in between. References from nodes
     /// before `first` stay as they are.
     pub fn make_room(&mut self, first: usize, by: usize) {
-        let mut nodes = vec_in_huge_pages(self.nodes.len() + by);
-        nodes.extend_from_slice(&self.nodes[..first]);
-        nodes.resize(first + by, Node::EMPTY);
-        let relocated = |child: Child| match child.kind() {
-            ChildKind::Inner(index) => Child::inner(index + by),
-            _ => child,
-        };
-        nodes.extend(
-            self.nodes[first..]
-                .iter()
-                .map(|node| node.relocated(relocated)),
-        );
-        self.nodes = nodes;
+        self.nodes.make_room(first, by);
+        for index in first + by..self.nodes.len() {
+            self.nodes
+                .get_mut(index)
+                .relocate(|child| match child.kind() {
+                    ChildKind::Inner(index) => Child::inner(index + by),
+                    _ => child,
+                });
+        }
         for root in &mut self.roots {
             *root += by as u32;
         }
@@ -150,13 +141,15 @@ impl<const N: usize> WideTree<N> {
     /// refer to.
     pub fn set_top(
         &mut self,
-        nodes: &[Node<N>],
+        nodes: &Nodes,
         before: usize,
         instances: impl Iterator<Item = PlacedTree>,
     ) {
-        self.nodes[..nodes.len()].clone_from_slice(nodes);
-        for node in &mut self.nodes[nodes.len()..before.max(nodes.len())] {
-            *node = Node::EMPTY;
+        for (index, node) in nodes.iter().enumerate() {
+            self.nodes.get_mut(index).copy(node);
+        }
+        for index in nodes.len()..before {
+            self.nodes.clear(index);
         }
         self.instances.clear();
         self.instances.extend(instances);
@@ -181,14 +174,4 @@ fn prim_bounds<B: LeafBlock>(blocks: &[B]) -> impl Iterator<Item = Aabb> {
     blocks
         .iter()
         .flat_map(move |block| lanes(block).map(|lane| block.bounds(lane)))
-}
-
-impl<const N: usize> Node<N> {
-    /// A node with the same boxes and other references. Empty slots stay empty.
-    fn relocated(&self, relocated: impl Fn(Child) -> Child) -> Self {
-        Self {
-            planes: self.planes,
-            children: self.children.map(|child| relocated(Child(child)).0),
-        }
-    }
 }

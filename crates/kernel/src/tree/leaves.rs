@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use super::node::Leaf;
 use super::slot_order::occupied_first;
-use super::wide::WideTree;
+use super::wide::Tree;
 use crate::aabb::Aabb;
 use crate::geometry::leaf_block::{InBlock, LeafBlock};
 use crate::geometry::primitives::PrimKind;
@@ -108,7 +108,7 @@ pub(crate) struct LeafPrim {
     pub bounds: Aabb,
 }
 
-impl<const N: usize> WideTree<N> {
+impl Tree {
     /// Number of a leaf among the leaves of all kinds: triangle blocks first, the empty one included.
     #[inline(always)]
     pub fn leaf_index(&self, leaf: Leaf) -> usize {
@@ -136,7 +136,7 @@ impl<const N: usize> WideTree<N> {
         f64::from(model.of(leaf.kind)) * self.leaf_len(leaf) as f64
     }
 
-    /// Permutes the lanes of every leaf, given in the order of [`WideTree::leaf_index`].
+    /// Permutes the lanes of every leaf, given in the order of [`Tree::leaf_index`].
     pub(super) fn permute_leaves(&mut self, mut lanes: &[[u8; BLOCK]]) {
         on_each_kind!(mut self, blocks => lanes = permute(blocks, lanes));
         debug_assert!(lanes.is_empty());
@@ -163,7 +163,9 @@ fn prims_of<B: LeafBlock>(block: &B) -> Vec<LeafPrim> {
 fn permute<'a, B: LeafBlock>(blocks: &mut [B], lanes: &'a [[u8; BLOCK]]) -> &'a [[u8; BLOCK]] {
     let (own, others) = lanes.split_at(blocks.len());
     for (block, lanes) in blocks.iter_mut().zip(own) {
-        block.permute(&occupied_first(lanes, block.count()));
+        let mut lanes = *lanes;
+        occupied_first(&mut lanes, block.count());
+        block.permute(&lanes);
     }
     others
 }

@@ -1,10 +1,11 @@
 //! The data structures of a tree, and the promises they keep.
 //!
 //! - `binary`: the binary tree that every builder makes;  `costs`: what a node and a primitive cost
-//! - `node`: a node of N children and its references to them;  `wide`: the N-wide tree;  `leaves`: its leaf blocks by kind
+//! - `node`: a node of N children and its references to them;  `nodes`: a list of nodes of any width
+//! - `wide`: the N-wide tree;  `leaves`: its leaf blocks by kind
 //! - `arena`: a tree put together from trees of objects;  `refit`: boxes and leaf blocks of primitives that moved
 //! - `validate`: a check of every promise of the wide tree;  `statistics`: its bytes and its cost
-//! - `width`: how many children a node has;  `any`: a tree of any width
+//! - `width`: how many children a node has;  `any`: the switch between widths
 //! - `motion`: what moves between two keys
 //! - `saved`: trees as words;  `words`: the files that these words make
 //! - `slot_order`: a permutation of the slots of a tree;  `rule`: how queries pick
@@ -16,6 +17,7 @@ pub(crate) mod costs;
 pub(crate) mod leaves;
 pub(crate) mod motion;
 pub(crate) mod node;
+pub(crate) mod nodes;
 pub(crate) mod refit;
 pub(crate) mod rule;
 pub(crate) mod saved;

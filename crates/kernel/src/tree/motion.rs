@@ -26,19 +26,12 @@ use crate::geometry::primitives::PrimKind;
 use crate::geometry::sound::is_sound;
 use crate::geometry::triangle::{TriangleBlock, Vector};
 use crate::geometry::{BLOCK, PrimRef};
-use crate::tree::node::{ChildKind, Leaf, Node};
-use crate::tree::wide::WideTree;
+use crate::tree::node::{Child, ChildKind, Leaf, Node, NodeRef};
+use crate::tree::nodes::Nodes;
+use crate::tree::wide::Tree;
 
 /// Sixteen roundings of `f32`.
 const INSTANCE: f32 = 1.0 / (1 << 20) as f32;
-
-/// Planes of the boxes of a node, `[axis][side][lane]`.
-#[derive(Clone, Debug)]
-#[repr(C, align(64))]
-pub(crate) struct NodeMotion<const N: usize> {
-    /// How far planes move from the start of the span to its end. Planes of empty lanes do not.
-    pub planes: [[[f32; N]; 2]; 3],
-}
 
 /// Corners of the triangles of a block at the end of the span, `[axis][corner][lane]`.
 #[derive(Clone, Debug)]
@@ -49,9 +42,10 @@ pub(crate) struct BlockMotion {
 
 /// Motion of nodes, blocks and instances during a span. The tree itself is the tree of the start.
 #[derive(Clone, Debug)]
-pub(crate) struct Motion<const N: usize> {
-    /// For each node of the tree of the world. Objects do not change inside.
-    pub nodes: Vec<NodeMotion<N>>,
+pub(crate) struct Motion {
+    /// For each node of the tree of the world, how far its planes move from the start of the span to its end. Planes of
+    /// empty lanes do not. Objects do not change inside.
+    pub nodes: Nodes,
     /// For each triangle block of the world.
     pub blocks: Vec<BlockMotion>,
     /// For each instance of the tree; `None` for one that does not move.
@@ -89,28 +83,21 @@ impl TriangleBlock {
     }
 }
 
-impl<const N: usize> NodeMotion<N> {
-    const NOTHING: Self = Self {
-        planes: [[[0.0; N]; 2]; 3],
-    };
-
-    /// The planes of a side at a share of the span.
-    #[inline(always)]
-    pub fn at<S: Simd + Width<N>>(
-        &self,
-        simd: S,
-        start: &Node<N>,
-        (axis, side): (usize, usize),
-        share: <S as Width<N>>::Lanes,
-    ) -> <S as Width<N>>::Lanes {
-        type NodeLanes<S, const N: usize> = <S as Width<N>>::Lanes;
-        let start = NodeLanes::<S, N>::load(simd, &start.planes[axis][side]);
-        let change = NodeLanes::<S, N>::load(simd, &self.planes[axis][side]);
-        share * change + start
-    }
+/// The planes of a side of a node at a share of the span in which it moves so far.
+#[inline(always)]
+pub(crate) fn planes_at<S: Simd + Width<N>, const N: usize>(
+    simd: S,
+    [start, moves]: [&Node<N>; 2],
+    (axis, side): (usize, usize),
+    share: <S as Width<N>>::Lanes,
+) -> <S as Width<N>>::Lanes {
+    type NodeLanes<S, const N: usize> = <S as Width<N>>::Lanes;
+    let start = NodeLanes::<S, N>::load(simd, &start.planes[axis][side]);
+    let change = NodeLanes::<S, N>::load(simd, &moves.planes[axis][side]);
+    share * change + start
 }
 
-impl<const N: usize> WideTree<N> {
+impl Tree {
     /// Makes a tree that was built over the middle of a span move between its keys.
     ///
     /// # Errors
@@ -118,12 +105,13 @@ impl<const N: usize> WideTree<N> {
     pub fn set_motion(&mut self, keys: &impl Keys) -> Result<(), Error> {
         let top = self.top_nodes();
         let mut motion = Motion {
-            nodes: alloc::vec![NodeMotion::NOTHING; top],
+            nodes: Nodes::with_capacity(self.width(), top),
             blocks: Vec::new(),
             placements: (self.instances.iter())
                 .map(|placed| keys.placement(placed.placement.inst_id).cloned())
                 .collect(),
         };
+        motion.nodes.resize(top);
         motion.blocks = self.moving_blocks(keys)?;
         let mut reach = self.reach;
         let placed = motion
@@ -142,9 +130,17 @@ impl<const N: usize> WideTree<N> {
         }
         let mut all = alloc::vec![[Aabb::EMPTY; 2]; top];
         for index in (0..top).rev() {
-            for slot in 0..self.nodes[index].len() {
-                let child = self.nodes[index].child(slot);
-                let still = self.nodes[index].bounds(slot);
+            let len = self.nodes.get(index).len();
+            for slot in len..self.width().lanes() {
+                let nothing = Aabb::around(&[[0.0; 3]]);
+                motion
+                    .nodes
+                    .get_mut(index)
+                    .set(slot, Child::EMPTY, &nothing);
+            }
+            for slot in 0..len {
+                let child = self.nodes.get(index).child(slot);
+                let still = self.nodes.get(index).bounds(slot);
                 let bounds = match child.kind() {
                     ChildKind::Inner(index) => all[index],
                     ChildKind::Leaf(Leaf {
@@ -160,13 +156,12 @@ impl<const N: usize> WideTree<N> {
                     },
                 };
                 let [start, end] = bounds;
-                self.nodes[index].set(slot, child, &start);
-                let planes = &mut motion.nodes[index].planes;
-                let lane = Node::<N>::lane(slot);
-                for axis in 0..3 {
-                    planes[axis][0][lane] = end.min[axis] - start.min[axis];
-                    planes[axis][1][lane] = end.max[axis] - start.max[axis];
-                }
+                self.nodes.get_mut(index).set(slot, child, &start);
+                let moves = Aabb {
+                    min: core::array::from_fn(|axis| end.min[axis] - start.min[axis]),
+                    max: core::array::from_fn(|axis| end.max[axis] - start.max[axis]),
+                };
+                motion.nodes.get_mut(index).set(slot, child, &moves);
                 let [first, last] = &mut all[index];
                 (*first, *last) = (first.union(&start), last.union(&end));
             }
@@ -185,12 +180,12 @@ impl<const N: usize> WideTree<N> {
         // Adding a rounded difference may miss a plane by a rounding of the scene extent.
         let slack = 4.0 * f32::EPSILON * self.reach;
         let keys = [0, 1];
-        for (index, node) in self.nodes[..self.top_nodes()].iter().enumerate() {
+        for (index, node) in self.nodes.iter().take(self.top_nodes()).enumerate() {
             for slot in 0..node.len() {
                 let own = keys.map(|key| self.slot_bounds(motion, (index, slot), key));
                 let below = match node.child(slot).kind() {
                     ChildKind::Inner(child) => keys.map(|key| {
-                        let slots = 0..self.nodes[child].len();
+                        let slots = 0..self.nodes.get(child).len();
                         slots.fold(Aabb::EMPTY, |all, slot| {
                             all.union(&self.slot_bounds(motion, (child, slot), key))
                         })
@@ -219,27 +214,21 @@ impl<const N: usize> WideTree<N> {
     }
 
     /// The box of a slot of a node at a key.
-    fn slot_bounds(&self, motion: &Motion<N>, (node, slot): (usize, usize), key: usize) -> Aabb {
-        let lane = Node::<N>::lane(slot);
-        let planes = |side: usize| {
-            core::array::from_fn(|axis| {
-                let change = motion.nodes[node].planes[axis][side][lane];
-                self.nodes[node].planes[axis][side][lane] + key as f32 * change
-            })
-        };
+    fn slot_bounds(&self, motion: &Motion, (node, slot): (usize, usize), key: usize) -> Aabb {
+        let start = self.nodes.get(node).bounds(slot);
+        let moves = motion.nodes.get(node).bounds(slot);
+        let at = |start: f32, change: f32| start + key as f32 * change;
         Aabb {
-            min: planes(0),
-            max: planes(1),
+            min: core::array::from_fn(|axis| at(start.min[axis], moves.min[axis])),
+            max: core::array::from_fn(|axis| at(start.max[axis], moves.max[axis])),
         }
     }
 
     /// Brings the triangle blocks of the world to the start of a span, and returns their end.
     fn moving_blocks(&mut self, keys: &impl Keys) -> Result<Vec<BlockMotion>, Error> {
-        let top = &self.nodes[..self.top_nodes()];
-        let children = top
-            .iter()
-            .flat_map(|node| (0..node.len()).map(|slot| node.child(slot)));
-        let of_world = children.filter_map(|child| match child.kind() {
+        let top = self.nodes.iter().take(self.top_nodes());
+        let children = top.flat_map(NodeRef::children);
+        let of_world = children.filter_map(|(child, _)| match child.kind() {
             ChildKind::Leaf(Leaf {
                 kind: PrimKind::Triangle,
                 index,

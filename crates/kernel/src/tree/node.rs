@@ -24,6 +24,12 @@ use crate::aabb::Aabb;
 use crate::geometry::primitives::kinds::for_each_scalar_kind;
 use crate::geometry::primitives::{MAX_INSTANCES, PrimKind};
 
+/// Slots of the widest nodes.
+pub(crate) const MAX_WIDTH: usize = 16;
+
+/// Something for each slot of a node. Those beyond its width are of no meaning.
+pub(crate) type PerSlot<T> = [T; MAX_WIDTH];
+
 /// Two values of the range of instances mean [`Child::EXIT`] and [`Child::DONE`].
 const _: () = assert!(Child::INSTANCE as usize + MAX_INSTANCES == Child::EXIT.0 as usize);
 
@@ -188,25 +194,66 @@ impl<const N: usize> Node<N> {
         N - 1 - slot
     }
 
-    pub fn set(&mut self, slot: usize, child: Child, bounds: &Aabb) {
-        let lane = Self::lane(slot);
-        for axis in 0..3 {
-            self.planes[axis][0][lane] = bounds.min[axis];
-            self.planes[axis][1][lane] = bounds.max[axis];
+    /// The node whatever its width.
+    pub fn any(&self) -> NodeRef<'_> {
+        NodeRef {
+            planes: self.planes.as_flattened().as_flattened(),
+            children: &self.children,
         }
-        self.children[lane] = child.0;
+    }
+
+    /// The node whatever its width, to be written.
+    pub fn any_mut(&mut self) -> NodeMut<'_> {
+        NodeMut {
+            planes: self.planes.as_flattened_mut().as_flattened_mut(),
+            children: &mut self.children,
+        }
+    }
+}
+
+/// A node of any width, for code that is compiled once: whatever makes, changes or checks trees. Queries take [`Node`]s.
+#[derive(Clone, Copy)]
+pub(crate) struct NodeRef<'a> {
+    /// `[axis][side][lane]`, as in a [`Node`].
+    planes: &'a [f32],
+    /// [`Child`] per lane.
+    children: &'a [u32],
+}
+
+impl NodeRef<'_> {
+    /// How many slots there are.
+    pub fn width(&self) -> usize {
+        self.children.len()
+    }
+
+    /// How many slots are occupied; they come first.
+    pub fn len(&self) -> usize {
+        let occupied = |child: &&u32| **child != Child::EMPTY.0;
+        self.children.iter().rev().take_while(occupied).count()
+    }
+
+    /// The lane that holds a slot.
+    pub fn lane(&self, slot: usize) -> usize {
+        self.width() - 1 - slot
     }
 
     pub fn child(&self, slot: usize) -> Child {
-        Child(self.children[Self::lane(slot)])
+        Child(self.children[self.lane(slot)])
     }
 
     pub fn bounds(&self, slot: usize) -> Aabb {
-        let lane = Self::lane(slot);
+        let width = self.width();
+        let plane =
+            |axis: usize, side: usize| self.planes[(2 * axis + side + 1) * width - 1 - slot];
         Aabb {
-            min: core::array::from_fn(|axis| self.planes[axis][0][lane]),
-            max: core::array::from_fn(|axis| self.planes[axis][1][lane]),
+            min: core::array::from_fn(|axis| plane(axis, 0)),
+            max: core::array::from_fn(|axis| plane(axis, 1)),
         }
+    }
+
+    /// The occupied slots with their boxes.
+    pub fn children(self) -> impl Iterator<Item = (Child, Aabb)> {
+        (0..self.len()).map(move |slot| (self.child(slot), self.bounds(slot)))
     }
 
     /// The box around all children.
@@ -214,18 +261,66 @@ impl<const N: usize> Node<N> {
         (0..self.len()).fold(Aabb::EMPTY, |all, slot| all.union(&self.bounds(slot)))
     }
 
-    /// How many slots are occupied; they come first.
-    pub fn len(&self) -> usize {
-        (0..N)
-            .take_while(|&slot| self.child(slot) != Child::EMPTY)
-            .count()
+    /// Half the surface areas of the boxes of all slots, occupied or not.
+    pub fn areas(&self) -> PerSlot<f32> {
+        let mut areas = [0.0; MAX_WIDTH];
+        for (slot, area) in areas.iter_mut().enumerate().take(self.width()) {
+            *area = self.bounds(slot).half_area();
+        }
+        areas
+    }
+}
+
+/// A [`NodeRef`] to be written.
+pub(crate) struct NodeMut<'a> {
+    planes: &'a mut [f32],
+    children: &'a mut [u32],
+}
+
+impl NodeMut<'_> {
+    pub fn set(&mut self, slot: usize, child: Child, bounds: &Aabb) {
+        let width = self.children.len();
+        let lane = width - 1 - slot;
+        for axis in 0..3 {
+            self.planes[2 * axis * width + lane] = bounds.min[axis];
+            self.planes[(2 * axis + 1) * width + lane] = bounds.max[axis];
+        }
+        self.children[lane] = child.0;
+    }
+
+    /// Makes it the same as another node of its width.
+    pub fn copy(&mut self, other: NodeRef<'_>) {
+        self.planes.copy_from_slice(other.planes);
+        self.children.copy_from_slice(other.children);
     }
 
     /// Puts the child of slot `slots[i]` into slot `i`.
-    pub fn permute(&mut self, slots: &[u8; N]) {
-        let old = self.clone();
-        for (slot, &from) in slots.iter().enumerate() {
-            self.set(slot, old.child(from as usize), &old.bounds(from as usize));
+    pub fn permute(&mut self, slots: &[u8]) {
+        let mut moved = [(Child::EMPTY, Aabb::EMPTY); MAX_WIDTH];
+        for (moved, &from) in moved.iter_mut().zip(slots) {
+            *moved = (
+                self.any().child(from.into()),
+                self.any().bounds(from.into()),
+            );
+        }
+        for (slot, (child, bounds)) in moved.iter().enumerate().take(slots.len()) {
+            self.set(slot, *child, bounds);
+        }
+    }
+
+    /// Replaces what the occupied slots refer to.
+    pub fn relocate(&mut self, relocated: impl Fn(Child) -> Child) {
+        for child in self.children.iter_mut() {
+            if *child != Child::EMPTY.0 {
+                *child = relocated(Child(*child)).0;
+            }
+        }
+    }
+
+    pub fn any(&self) -> NodeRef<'_> {
+        NodeRef {
+            planes: self.planes,
+            children: self.children,
         }
     }
 }

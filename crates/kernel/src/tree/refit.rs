@@ -8,8 +8,9 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 use super::leaves::{first_block, on_each_kind};
-use super::node::{Child, ChildKind, Leaf, Node};
-use super::wide::WideTree;
+use super::node::{Child, ChildKind, Leaf};
+use super::nodes::NodesMut;
+use super::wide::Tree;
 use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::geometry::leaf_block::LeafBlock;
@@ -41,7 +42,7 @@ impl TreePlaces {
     }
 }
 
-impl<const N: usize> WideTree<N> {
+impl Tree {
     /// Places of everything, but for the block that empty slots refer to.
     pub fn all_places(&self) -> TreePlaces {
         let lens = self.blocks.lens();
@@ -68,7 +69,7 @@ impl<const N: usize> WideTree<N> {
             .map(|(places, _)| LeafBounds::new(places))
             .collect();
         on_each_kind!(mut self, blocks => refill(blocks, trees, &mut leaves));
-        let mut nodes = Pieces::new(&mut self.nodes);
+        let mut nodes = Pieces::new(self.nodes.as_mut());
         let jobs = leaves.iter().map(|leaves| Job {
             nodes: nodes.take(&leaves.places.nodes),
             leaves,
@@ -78,59 +79,76 @@ impl<const N: usize> WideTree<N> {
 
     /// Cost of a random line through the box of a tree at these places, which has no instances.
     pub fn sah_at(&self, places: &TreePlaces) -> f64 {
-        let bounds = self.nodes[places.nodes.start].all_bounds();
+        let bounds = self.nodes.get(places.nodes.start).all_bounds();
         self.sah_of(places.nodes.clone(), &bounds, &CostModel::default(), &[])
     }
 }
 
 /// A slice of which pieces are taken, one behind the other.
-struct Pieces<'a, T> {
-    rest: &'a mut [T],
+struct Pieces<T> {
+    rest: Option<T>,
     taken: usize,
 }
 
-impl<'a, T> Pieces<'a, T> {
-    fn new(all: &'a mut [T]) -> Self {
+impl<T: SplitAt> Pieces<T> {
+    fn new(all: T) -> Self {
         Self {
-            rest: all,
+            rest: Some(all),
             taken: 0,
         }
     }
 
     /// The next piece, which begins at or after the end of the last one.
-    fn take(&mut self, range: &Range<usize>) -> &'a mut [T] {
-        let rest = core::mem::take(&mut self.rest);
-        let (_, rest) = rest.split_at_mut(range.start - self.taken);
-        let (piece, rest) = rest.split_at_mut(range.len());
-        self.rest = rest;
+    fn take(&mut self, range: &Range<usize>) -> T {
+        let rest = self.rest.take().expect("put back below");
+        let (_, rest) = rest.split(range.start - self.taken);
+        let (piece, rest) = rest.split(range.len());
+        self.rest = Some(rest);
         self.taken = range.end;
         piece
     }
 }
 
+/// What pieces are taken of.
+trait SplitAt: Sized {
+    fn split(self, middle: usize) -> (Self, Self);
+}
+
+impl<T> SplitAt for &mut [T] {
+    fn split(self, middle: usize) -> (Self, Self) {
+        self.split_at_mut(middle)
+    }
+}
+
+impl SplitAt for NodesMut<'_> {
+    fn split(self, middle: usize) -> (Self, Self) {
+        self.split_at(middle)
+    }
+}
+
 /// A tree whose leaf blocks are refitted.
-struct Job<'a, const N: usize> {
-    nodes: &'a mut [Node<N>],
+struct Job<'a> {
+    nodes: NodesMut<'a>,
     leaves: &'a LeafBounds<'a>,
 }
 
-impl<const N: usize> Job<'_, N> {
-    fn run(self) {
+impl Job<'_> {
+    fn run(mut self) {
         let first = self.leaves.places.nodes.start;
         let mut subtrees = Vec::new();
         let mut above = Vec::new();
-        cut(self.nodes, first, &mut subtrees, &mut above);
-        let mut pieces = Pieces::new(&mut *self.nodes);
+        cut(&self.nodes, first, &mut subtrees, &mut above);
+        let mut pieces = Pieces::new(self.nodes.reborrow());
         let jobs = subtrees
             .into_iter()
             .map(|range| (first + range.start, pieces.take(&range)));
-        for_each(jobs.collect(), |(first, nodes)| {
+        for_each(jobs.collect(), |(first, mut nodes): (_, NodesMut<'_>)| {
             for node in (0..nodes.len()).rev() {
-                refit_node(nodes, first, node, self.leaves);
+                refit_node(&mut nodes, first, node, self.leaves);
             }
         });
         for node in above.into_iter().rev() {
-            refit_node(self.nodes, first, node, self.leaves);
+            refit_node(&mut self.nodes, first, node, self.leaves);
         }
     }
 }
@@ -184,28 +202,23 @@ impl<'a> LeafBounds<'a> {
 
 /// Recomputes the boxes of a node. The boxes of its children are already new. `first` is the place of the first of
 /// `nodes` in the tree.
-fn refit_node<const N: usize>(
-    nodes: &mut [Node<N>],
-    first: usize,
-    node: usize,
-    leaves: &LeafBounds<'_>,
-) {
-    for slot in 0..nodes[node].len() {
-        let child = nodes[node].child(slot);
+fn refit_node(nodes: &mut NodesMut<'_>, first: usize, node: usize, leaves: &LeafBounds<'_>) {
+    for slot in 0..nodes.get(node).len() {
+        let child = nodes.get(node).child(slot);
         let bounds = match child.kind() {
-            ChildKind::Inner(index) => nodes[index - first].all_bounds(),
+            ChildKind::Inner(index) => nodes.get(index - first).all_bounds(),
             ChildKind::Leaf(leaf) => leaves.of(leaf),
             // Trees with instances are not refitted.
-            ChildKind::Instance(_) => nodes[node].bounds(slot),
+            ChildKind::Instance(_) => nodes.get(node).bounds(slot),
         };
-        nodes[node].set(slot, child, &bounds);
+        nodes.get_mut(node).set(slot, child, &bounds);
     }
 }
 
 /// Cuts a tree, or what is left of one that was taken apart, into subtrees that are small enough, and the nodes above
 /// them, both in ascending order. Indices count from the first of `nodes`, which is at `first` in the tree.
-fn cut<const N: usize>(
-    nodes: &[Node<N>],
+fn cut(
+    nodes: &NodesMut<'_>,
     first: usize,
     subtrees: &mut Vec<Range<usize>>,
     above: &mut Vec<usize>,
@@ -223,8 +236,9 @@ fn cut<const N: usize>(
             continue;
         }
         above.push(range.start);
-        let mut starts: Vec<_> = (0..N)
-            .filter_map(|slot| inner(nodes[range.start].child(slot)))
+        let children = nodes.get(range.start).children();
+        let mut starts: Vec<_> = children
+            .filter_map(|(child, _)| inner(child))
             .map(|index| index - first)
             .collect();
         starts.sort_unstable();
@@ -241,19 +255,21 @@ fn up_to(starts: Vec<usize>, end: usize) -> Vec<Range<usize>> {
 }
 
 /// The nodes that no other refers to, if the nodes of every subtree follow each other.
-fn roots_of<const N: usize>(nodes: &[Node<N>], first: usize) -> Option<Vec<usize>> {
+fn roots_of(nodes: &NodesMut<'_>, first: usize) -> Option<Vec<usize>> {
     // Per node, how many nodes are in its subtree, and behind the last of them.
     let mut sizes = vec![(1, 0); nodes.len()];
     let mut is_root = vec![true; nodes.len()];
     let stand_together = (0..nodes.len()).rev().all(|node| {
         let (mut count, mut end) = (1, node + 1);
-        for slot in 0..N {
-            if let Some(child) = inner(nodes[node].child(slot)) {
-                let (below, last) = sizes[child - first];
-                is_root[child - first] = false;
-                count += below;
-                end = end.max(last);
-            }
+        for child in nodes
+            .get(node)
+            .children()
+            .filter_map(|(child, _)| inner(child))
+        {
+            let (below, last) = sizes[child - first];
+            is_root[child - first] = false;
+            count += below;
+            end = end.max(last);
         }
         sizes[node] = (count, end);
         end - node == count

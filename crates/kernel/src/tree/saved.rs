@@ -1,7 +1,7 @@
 //! Trees as words of a file: see [`super::words`].
 //!
 //! Only what is there is written: occupied slots and lanes. Blocks and nodes are then made as a collapse makes them, so
-//! that their empty lanes keep their promises whatever a file says. [`WideTree::walk`] checks the rest, with boxes
+//! that their empty lanes keep their promises whatever a file says. [`Tree::walk`] checks the rest, with boxes
 //! around leaves that are made while their primitives are available.
 
 use alloc::format;
@@ -10,10 +10,12 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::leaves::LeafBlocks;
-use super::node::{Child, ChildKind, Leaf, Node};
+use super::node::{Child, ChildKind, Leaf, Node, NodeMut};
+use super::nodes::Nodes;
 use super::rule::Rule;
 use super::validate::{LeafBoxes, Walked, block_box};
-use super::wide::{PlacedTree, WideTree};
+use super::wide::{PlacedTree, Tree};
+use super::width::Width;
 use super::words::{Sink, Words};
 use crate::aabb::Aabb;
 use crate::error::Error;
@@ -36,10 +38,11 @@ const EMPTY_NODE: usize = 7;
 /// Number of a primitive of user geometry that nothing hits, among the shapes of a file.
 const NO_SHAPE: u32 = u32::MAX;
 
-impl<const N: usize> WideTree<N> {
+impl Tree {
     /// Bytes of memory that a file of the tree takes, at most, without the bytes of shapes and filters.
     pub fn file_bytes(&self) -> usize {
-        self.nodes.len() * 28 * N / 2 + self.blocks.triangles.len() * (4 + 44 * BLOCK)
+        self.nodes.len() * 28 * self.width().lanes() / 2
+            + self.blocks.triangles.len() * (4 + 44 * BLOCK)
     }
 
     /// Writes everything but functions.
@@ -51,7 +54,7 @@ impl<const N: usize> WideTree<N> {
             sink.word(root);
         }
         sink.word(self.nodes.len() as u32);
-        for node in &self.nodes {
+        for node in self.nodes.iter() {
             let count = node.len();
             sink.word(count as u32);
             for slot in 0..count {
@@ -93,13 +96,17 @@ impl<const N: usize> WideTree<N> {
         self.pick.write(sink);
     }
 
-    /// A tree as [`WideTree::write`] wrote it, with these functions, and what was found when it was checked.
-    pub fn read(words: &mut Words<'_>, functions: &Functions) -> Result<(Self, Walked), Error> {
+    /// A tree as [`Tree::write`] wrote it, with these functions, and what was found when it was checked.
+    pub fn read(
+        words: &mut Words<'_>,
+        width: Width,
+        functions: &Functions,
+    ) -> Result<(Self, Walked), Error> {
         let bounds = read_box(words)?;
         let [reach] = words.floats()?;
         let count = words.count()?;
         let roots = words.list([], count, Words::word)?;
-        let nodes = read_nodes(words)?;
+        let nodes = read_nodes(words, width)?;
         let mut boxes = LeafBoxes::default();
         let mut blocks = read_triangles_and_scalars(words, &mut boxes)?;
         let filters = Filters::read(words, functions)?;
@@ -197,35 +204,54 @@ fn read_box(words: &mut Words<'_>) -> Result<Aabb, Error> {
     })
 }
 
-fn read_nodes<const N: usize>(words: &mut Words<'_>) -> Result<Vec<Node<N>>, Error> {
+fn read_nodes(words: &mut Words<'_>, width: Width) -> Result<Nodes, Error> {
+    Ok(match width {
+        Width::W4 => Nodes::W4(read_list(words, Node::EMPTY, Node::any_mut)?),
+        Width::W8 => Nodes::W8(read_list(words, Node::EMPTY, Node::any_mut)?),
+        Width::W16 => Nodes::W16(read_list(words, Node::EMPTY, Node::any_mut)?),
+    })
+}
+
+/// Reads nodes of one width, which are `empty` at first.
+fn read_list<T: Clone>(
+    words: &mut Words<'_>,
+    empty: T,
+    any: impl Fn(&mut T) -> NodeMut<'_>,
+) -> Result<Vec<T>, Error> {
     let all = words.count()?;
     if all == 0 {
         return Err(words.error("a tree without a root"));
     }
     words.list([], all, |words| {
-        let mut node = Node::EMPTY;
-        let count = words.count()?;
-        if count > N {
-            return Err(words.error(format!("a node has {count} children")));
-        }
-        for slot in 0..count {
-            let [child, planes @ ..] = words.words::<7>()?;
-            if Child(child) == Child::EMPTY {
-                return Err(words.error("a child is empty"));
-            }
-            let [a, b, c, d, e, f] = planes.map(f32::from_bits);
-            let bounds = Aabb {
-                min: [a, b, c],
-                max: [d, e, f],
-            };
-            node.set(slot, Child(child), &bounds);
-        }
-        // The root of an empty tree is a word long.
-        if count == 0 && all > 1 {
-            words.words::<EMPTY_NODE>()?;
-        }
+        let mut node = empty.clone();
+        read_node(words, any(&mut node), all)?;
         Ok(node)
     })
+}
+
+/// Reads one of `all` nodes.
+fn read_node(words: &mut Words<'_>, mut node: NodeMut<'_>, all: usize) -> Result<(), Error> {
+    let count = words.count()?;
+    if count > node.any().width() {
+        return Err(words.error(format!("a node has {count} children")));
+    }
+    for slot in 0..count {
+        let [child, planes @ ..] = words.words::<7>()?;
+        if Child(child) == Child::EMPTY {
+            return Err(words.error("a child is empty"));
+        }
+        let [a, b, c, d, e, f] = planes.map(f32::from_bits);
+        let bounds = Aabb {
+            min: [a, b, c],
+            max: [d, e, f],
+        };
+        node.set(slot, Child(child), &bounds);
+    }
+    // The root of an empty tree is a word long.
+    if count == 0 && all > 1 {
+        words.words::<EMPTY_NODE>()?;
+    }
+    Ok(())
 }
 
 /// Writes leaf blocks of one kind, lane by lane.

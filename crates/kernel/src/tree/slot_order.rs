@@ -1,7 +1,9 @@
 //! A permutation of the slots of a tree.
 
+use alloc::vec;
 use alloc::vec::Vec;
 
+use super::node::PerSlot;
 use super::rule::Rule;
 use crate::geometry::BLOCK;
 use crate::shape::Shape;
@@ -31,14 +33,30 @@ impl SlotOrder {
             pick: Rule::Slots,
         }
     }
+
+    /// Leaves the leaves as they are; a place for every slot, to be [set](Self::set) for all nodes.
+    pub(crate) fn of_nodes(shape: Shape) -> Self {
+        Self {
+            slots: vec![0; shape.nodes * shape.width],
+            ..Self::as_built(shape)
+        }
+    }
+
+    /// Sets the order of a node.
+    pub(crate) fn set(&mut self, node: usize, slots: &PerSlot<u8>) {
+        let width = self.shape.width;
+        self.slots[node * width..][..width].copy_from_slice(&slots[..width]);
+    }
+
+    /// Appends the order of the next node.
+    pub(crate) fn push(&mut self, slots: &PerSlot<u8>) {
+        self.slots.extend_from_slice(&slots[..self.shape.width]);
+    }
 }
 
-/// A slot order with the places from `count` on, which are empty, moved to the end. Planned orders have them there.
+/// Moves the places from `count` on, which are empty, to the end of a slot order. Planned orders have them there.
 /// Orders from a forged file or log may not.
-pub(super) fn occupied_first<const N: usize>(places: &[u8; N], count: usize) -> [u8; N] {
-    let is_occupied = |place: &u8| usize::from(*place) < count;
-    let mut sorted = *places;
+pub(super) fn occupied_first(places: &mut [u8], count: usize) {
     // Stable.
-    sorted.sort_by_key(|place| !is_occupied(place));
-    sorted
+    places.sort_by_key(|place| usize::from(*place) >= count);
 }

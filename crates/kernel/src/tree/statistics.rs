@@ -4,17 +4,18 @@ use alloc::vec;
 use core::ops::Range;
 
 use super::node::ChildKind;
-use super::wide::WideTree;
+use super::wide::Tree;
 use crate::aabb::Aabb;
 use crate::tree::costs::CostModel;
 
-impl<const N: usize> WideTree<N> {
-    /// Bytes of nodes, leaf blocks, instances and opacity micromaps.
+impl Tree {
+    /// Bytes of nodes, leaf blocks, instances, opacity micromaps, and orders that are looked up.
     pub fn bytes(&self) -> usize {
-        size_of_val(&self.nodes[..])
+        self.nodes.bytes()
             + self.leaf_bytes()
             + size_of_val(&self.instances[..])
             + self.filters.bytes()
+            + self.pick.bytes()
     }
 
     /// Cost of a random line by the surface area heuristic, see [`crate::BuildReport`].
@@ -23,7 +24,7 @@ impl<const N: usize> WideTree<N> {
         for (object, &root) in self.roots.iter().enumerate() {
             let end = self.roots.get(object + 1);
             let nodes = root as usize..end.map_or(self.nodes.len(), |end| *end as usize);
-            let bounds = self.nodes[root as usize].all_bounds();
+            let bounds = self.nodes.get(root as usize).all_bounds();
             objects[object] = self.sah_of(nodes, &bounds, model, &[]);
         }
         self.sah_of(0..self.top_nodes(), &self.bounds, model, &objects)
@@ -39,9 +40,9 @@ impl<const N: usize> WideTree<N> {
     ) -> f64 {
         let root = f64::from(bounds.half_area());
         let mut sah = f64::from(model.node);
-        for node in &self.nodes[nodes] {
-            for slot in 0..node.len() {
-                let cost = match node.child(slot).kind() {
+        for index in nodes {
+            for (child, bounds) in self.nodes.get(index).children() {
+                let cost = match child.kind() {
                     ChildKind::Inner(_) => f64::from(model.node),
                     ChildKind::Leaf(leaf) => self.leaf_cost(leaf, model),
                     ChildKind::Instance(instance) => {
@@ -50,7 +51,7 @@ impl<const N: usize> WideTree<N> {
                         f64::from(model.entry) + objects[object]
                     }
                 };
-                let share = f64::from(node.bounds(slot).half_area()) / root;
+                let share = f64::from(bounds.half_area()) / root;
                 // 0 / 0 of a scene without area, ∞ / ∞ of one that overflows.
                 sah += if share.is_finite() { share * cost } else { 0.0 };
             }

@@ -2,8 +2,8 @@
 //!
 //! One function per promise, named for it. Each returns the first place where it finds the promise broken.
 //!
-//! [`WideTree::walk`] is one pass over the nodes, which also files are worth. It checks all that queries, refits and learning
-//! rely on to end without a panic: with it, boxes hold what is below them, so rays find what is there. [`WideTree::validate`]
+//! [`Tree::walk`] is one pass over the nodes, which also files are worth. It checks all that queries, refits and learning
+//! rely on to end without a panic: with it, boxes hold what is below them, so rays find what is there. [`Tree::validate`]
 //! checks as well what needs every primitive to be looked up among all others.
 
 use alloc::format;
@@ -13,7 +13,7 @@ use alloc::vec::Vec;
 
 use super::leaves::on_each_kind;
 use super::node::{Child, ChildKind, Leaf};
-use super::wide::WideTree;
+use super::wide::Tree;
 use crate::aabb::Aabb;
 use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::primitives::PrimKind;
@@ -50,7 +50,7 @@ pub(crate) fn block_box<B: LeafBlock>(block: &B) -> Aabb {
     bounds
 }
 
-impl<const N: usize> WideTree<N> {
+impl Tree {
     /// Checks every promise that traversal relies on. Returns how many primitives are in leaves, those in several of them
     /// counted once.
     ///
@@ -69,7 +69,7 @@ impl<const N: usize> WideTree<N> {
 
     /// Walks all nodes and checks every promise that keeps queries from panicking or running for ever, and boxes. Takes boxes
     /// around leaf blocks. Whether the parts of primitives that are in several leaves make a whole is left to
-    /// [`WideTree::primitives_are_whole`].
+    /// [`Tree::primitives_are_whole`].
     ///
     /// # Errors
     /// The first broken promise, in words.
@@ -98,7 +98,7 @@ impl<const N: usize> WideTree<N> {
     /// How many primitives are in leaves, those in several of them counted once, of a tree that was walked.
     ///
     /// # Errors
-    /// As [`WideTree::primitives_are_whole`], if any primitive sticks out of the box of its leaf.
+    /// As [`Tree::primitives_are_whole`], if any primitive sticks out of the box of its leaf.
     pub fn count_primitives(&self, walked: &Walked) -> Result<usize, String> {
         if walked.some_stick_out {
             return self.primitives_are_whole();
@@ -117,7 +117,7 @@ impl<const N: usize> WideTree<N> {
 
     fn empty_slots_follow_occupied_ones(&self) -> Verdict {
         for (index, node) in self.nodes.iter().enumerate() {
-            for slot in node.len()..N {
+            for slot in node.len()..node.width() {
                 let is_empty = node.child(slot) == Child::EMPTY && node.bounds(slot) == Aabb::EMPTY;
                 promise(is_empty, || {
                     format!(
@@ -239,8 +239,8 @@ impl Walked {
 }
 
 /// A walk over all nodes, the last one first.
-struct Walk<'a, const N: usize> {
-    tree: &'a WideTree<N>,
+struct Walk<'a> {
+    tree: &'a Tree,
     leaves: &'a LeafBoxes,
     /// Whether a slot refers to each node, leaf and instance.
     node_has_parent: Vec<bool>,
@@ -251,8 +251,8 @@ struct Walk<'a, const N: usize> {
     walked: Walked,
 }
 
-impl<'a, const N: usize> Walk<'a, N> {
-    fn new(tree: &'a WideTree<N>, leaves: &'a LeafBoxes) -> Self {
+impl<'a> Walk<'a> {
+    fn new(tree: &'a Tree, leaves: &'a LeafBoxes) -> Self {
         let nodes = tree.nodes.len();
         Self {
             tree,
@@ -271,7 +271,7 @@ impl<'a, const N: usize> Walk<'a, N> {
     /// Checks a node of a tree, 0 being the world and objects following, whose nodes end at `end`. All nodes behind it have
     /// been checked.
     fn check_node(&mut self, index: usize, tree: usize, end: usize) -> Verdict {
-        let node = &self.tree.nodes[index];
+        let node = self.tree.nodes.get(index);
         let mut all = Aabb::EMPTY;
         for slot in 0..node.len() {
             let at = Place { index, slot };
@@ -353,7 +353,7 @@ impl<'a, const N: usize> Walk<'a, N> {
     fn everything_has_one_parent(&self) -> Verdict {
         for (index, &has_parent) in self.node_has_parent.iter().enumerate() {
             let is_root = || index == 0 || self.tree.roots.binary_search(&(index as u32)).is_ok();
-            let is_room = || self.tree.nodes[index].len() == 0;
+            let is_room = || self.tree.nodes.get(index).len() == 0;
             promise(has_parent || is_root() || is_room(), || {
                 format!("node {index} has no parent")
             })?;

@@ -1,7 +1,9 @@
 //! The N-wide tree: its nodes, leaf blocks and instances, their numbers, and changes of their order.
 
 use alloc::sync::Arc;
+use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Deref;
 
 use crate::aabb::Aabb;
 use crate::geometry::cutout::Filters;
@@ -10,18 +12,20 @@ use crate::shape::Shape;
 use crate::tree::leaves::LeafBlocks;
 use crate::tree::motion::Motion;
 use crate::tree::node::Node;
+use crate::tree::nodes::Nodes;
 use crate::tree::rule::Rule;
 use crate::tree::slot_order::{SlotOrder, occupied_first};
+use crate::tree::width::Width;
 
-/// A tree of nodes with `N` children, or one tree over the world and one for each object that instances place
+/// A tree of nodes with as many children, or one tree over the world and one for each object that instances place
 /// in it.
 ///
 /// Node 0 is the root of the world's tree and always exists; the trees of objects are behind it, one after the other.
 /// Children follow their parents, also from an instance to the root of its object. Triangle block 0 is empty: empty
 /// slots refer to it.
 #[derive(Clone, Debug)]
-pub(crate) struct WideTree<const N: usize> {
-    pub nodes: Vec<Node<N>>,
+pub(crate) struct Tree {
+    pub nodes: Nodes,
     pub blocks: LeafBlocks,
     /// Filters that decide about the hits of cut-out blocks.
     pub filters: Arc<Filters>,
@@ -38,7 +42,24 @@ pub(crate) struct WideTree<const N: usize> {
     /// How occlusion queries pick the next child.
     pub pick: Rule,
     /// Motion during a span, if anything moves. Nodes and leaves are then at the start of the span.
-    pub motion: Option<Arc<Motion<N>>>,
+    pub motion: Option<Arc<Motion>>,
+}
+
+/// A tree as queries see it, which are compiled for the width of its nodes.
+pub(crate) struct WideTree<'a, const N: usize> {
+    pub nodes: &'a [Node<N>],
+    /// How far the planes of the nodes of the world move during a span; empty if nothing moves.
+    pub moves: &'a [Node<N>],
+    pub tree: &'a Tree,
+}
+
+impl<const N: usize> Deref for WideTree<'_, N> {
+    type Target = Tree;
+
+    #[inline(always)]
+    fn deref(&self) -> &Tree {
+        self.tree
+    }
 }
 
 /// An instance in a tree.
@@ -54,7 +75,33 @@ pub(crate) struct PlacedTree {
     pub world_from_object: [[f32; 4]; 3],
 }
 
-impl<const N: usize> WideTree<N> {
+impl Tree {
+    /// A tree over nothing, with these nodes: a root without children comes first.
+    pub fn over_nothing(mut nodes: Nodes, blocks: LeafBlocks) -> Self {
+        nodes.push_empty();
+        Self {
+            nodes,
+            blocks,
+            filters: Arc::default(),
+            instances: Vec::new(),
+            roots: Vec::new(),
+            bounds: Aabb::EMPTY,
+            reach: 0.0,
+            depth: 1,
+            pick: Rule::Slots,
+            motion: None,
+        }
+    }
+
+    /// A tree over nothing.
+    pub fn empty(width: Width) -> Self {
+        Self::over_nothing(Nodes::with_capacity(width, 1), LeafBlocks::empty())
+    }
+
+    pub fn width(&self) -> Width {
+        self.nodes.width()
+    }
+
     /// Instances are numbered behind the leaves, where both are counted.
     #[inline(always)]
     pub fn instance_index(&self, instance: usize) -> usize {
@@ -70,14 +117,14 @@ impl<const N: usize> WideTree<N> {
 
     /// Nodes that are room for others: those without children, but for roots.
     pub fn room(&self) -> usize {
-        let top = &self.nodes[1..self.top_nodes()];
-        top.iter().filter(|node| node.len() == 0).count()
+        let top = self.nodes.iter().take(self.top_nodes()).skip(1);
+        top.filter(|node| node.len() == 0).count()
     }
 
     /// Counts that a log or order must have in common with the tree.
     pub fn shape(&self) -> Shape {
         Shape {
-            width: N,
+            width: self.width().lanes(),
             nodes: self.nodes.len(),
             leaves: self.leaf_count(),
             instances: self.instances.len(),
@@ -87,11 +134,12 @@ impl<const N: usize> WideTree<N> {
 
     /// Permutes slots and leaf lanes. The order was made for a tree of this shape.
     pub fn apply(&mut self, order: &SlotOrder) {
-        if !order.slots.is_empty() {
-            let (permutations, _) = order.slots.as_chunks::<N>();
-            for (node, slots) in self.nodes.iter_mut().zip(permutations) {
-                node.permute(&occupied_first(slots, node.len()));
-            }
+        let mut occupied = vec![0; self.width().lanes()];
+        for (index, slots) in order.slots.chunks(occupied.len()).enumerate() {
+            occupied.copy_from_slice(slots);
+            let mut node = self.nodes.get_mut(index);
+            occupied_first(&mut occupied, node.any().len());
+            node.permute(&occupied);
         }
         if !order.lanes.is_empty() {
             self.permute_leaves(&order.lanes);

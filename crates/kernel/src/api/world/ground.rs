@@ -8,9 +8,9 @@ use alloc::vec::Vec;
 use super::Joined;
 use crate::aabb::Aabb;
 use crate::builder::top_level::{TopChild, TopItem, take_apart};
-use crate::tree::node::{Child, ChildKind, Node};
+use crate::tree::node::{Child, ChildKind};
 use crate::tree::refit::TreePlaces;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 
 /// The ground is taken apart into at least this many subtrees, and one per instance up to [`MOST_SUBTREES`].
 const SUBTREES: usize = 64;
@@ -33,15 +33,16 @@ pub(super) struct Ground {
 
 impl Ground {
     /// Takes apart a tree that has joined, for this number of instances.
-    pub fn new<const N: usize>(tree: &mut WideTree<N>, joined: Joined, instances: usize) -> Self {
+    pub fn new(tree: &mut Tree, joined: Joined, instances: usize) -> Self {
         let count = instances.clamp(SUBTREES, MOST_SUBTREES);
         let whole = (Child::inner(joined.places.nodes.start), tree.bounds);
         let children = |child: Child| {
             let ChildKind::Inner(index) = child.kind() else {
                 return None;
             };
-            let node = core::mem::replace(&mut tree.nodes[index], Node::EMPTY);
-            Some((0..node.len()).map(move |slot| (node.child(slot), node.bounds(slot))))
+            let children: Vec<_> = tree.nodes.get(index).children().collect();
+            tree.nodes.clear(index);
+            Some(children.into_iter())
         };
         let parts = take_apart(whole, count, children).into_iter();
         Self {
@@ -62,11 +63,11 @@ impl Ground {
     }
 
     /// Finds the boxes of subtrees that were refitted.
-    pub fn measure<const N: usize>(&mut self, tree: &WideTree<N>) {
+    pub fn measure(&mut self, tree: &Tree) {
         for item in &mut self.items {
             if let TopChild::Subtree(child) = item.child {
                 item.bounds = match child.kind() {
-                    ChildKind::Inner(index) => tree.nodes[index].all_bounds(),
+                    ChildKind::Inner(index) => tree.nodes.get(index).all_bounds(),
                     ChildKind::Leaf(leaf) => {
                         let place = TreePlaces::of_leaf(leaf);
                         let prims = tree.prim_bounds(&place);

@@ -11,9 +11,7 @@ use crate::api::child_order::{ChildOrder, Ranks};
 use crate::api::recipe::Recipe;
 use crate::builder::top_level::TopChild;
 use crate::ray::Ray;
-use crate::tree::any::on_tree;
 use crate::tree::node::ChildKind;
-use crate::tree::wide::WideTree;
 
 impl World {
     /// Learns the child order of everything again, for these rays in the world as it is now: see
@@ -25,7 +23,7 @@ impl World {
     pub fn relearn(&mut self, rays: &[Ray], recipe: &Recipe) -> ChildOrder {
         let mut order = self.bvh.relearn_from(self.top_room, rays, recipe);
         if !rays.is_empty() && recipe.order.learns() {
-            self.ranks = on_tree!(&self.bvh.tree, tree => self.ranks_now(tree));
+            self.ranks = self.ranks_now();
         }
         order.ranks.clone_from(&self.ranks);
         order
@@ -42,7 +40,8 @@ impl World {
     }
 
     /// The places of items in the top level as it is now.
-    fn ranks_now<const N: usize>(&self, tree: &WideTree<N>) -> Ranks {
+    fn ranks_now(&self) -> Ranks {
+        let tree = &self.bvh.tree;
         let mut ranks = Ranks {
             ground: vec![0; self.ground.items.len()],
             instances: vec![0; self.instances.len()],
@@ -57,11 +56,11 @@ impl World {
         let mut rank = 0;
         let mut open = vec![(0, 0)];
         while let Some((node, slot)) = open.pop() {
-            if slot == tree.nodes[node].len() {
+            if slot == tree.nodes.get(node).len() {
                 continue;
             }
             open.push((node, slot + 1));
-            let child = tree.nodes[node].child(slot);
+            let child = tree.nodes.get(node).child(slot);
             let place = match child.kind() {
                 ChildKind::Inner(index) if index < self.top_nodes => {
                     open.push((index, 0));

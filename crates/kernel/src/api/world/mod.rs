@@ -23,12 +23,10 @@ use crate::geometry::primitives::{MAX_INSTANCES, Primitives};
 use crate::geometry::{Geometry, Instance};
 use crate::parallel::map;
 use crate::ray::Ray;
-use crate::tree::any::{Tree, on_tree};
 use crate::tree::node::Child;
 use crate::tree::refit::TreePlaces;
 use crate::tree::rule::Rule;
-use crate::tree::wide::{PlacedTree, WideTree};
-use crate::tree::width::Width;
+use crate::tree::wide::{PlacedTree, Tree};
 
 /// From this many instances on it pays to prepare an object for them.
 const MANY: usize = 32;
@@ -203,22 +201,11 @@ impl World {
 
     /// Adds an object, or the ground, which has no number.
     fn join(&mut self, object: &Object, number: Option<u32>) -> Result<u32, Error> {
-        let found = object.bvh().width();
-        let expected = self.bvh.width();
-        match (&mut self.bvh.tree, &object.bvh().tree) {
-            (Tree::W4(tree), Tree::W4(other)) => join(tree, other, number),
-            (Tree::W8(tree), Tree::W8(other)) => join(tree, other, number),
-            (Tree::W16(tree), Tree::W16(other)) => join(tree, other, number),
-            _ => Err(Error::OtherWidth {
-                expected: expected.lanes(),
-                found: found.lanes(),
-            }),
-        }
-        .map(|places| {
-            self.count(object);
-            self.objects.push(Joined::new(object, places));
-            self.objects.len() as u32 - 1
-        })
+        let places = self.bvh.tree.join(&object.bvh().tree, number)?;
+        self.bvh.tree.roots.push(places.nodes.start as u32);
+        self.count(object);
+        self.objects.push(Joined::new(object, places));
+        Ok(self.objects.len() as u32 - 1)
     }
 
     /// Gives masks to the ground (`world`), to objects in the order in which they joined, and to instances: see
@@ -233,7 +220,7 @@ impl World {
     /// If there is no such object.
     pub fn quality(&self, object: u32) -> f64 {
         let object = &self.objects[object as usize];
-        let now = |places| on_tree!(&self.bvh.tree, tree => tree.sah_at(places));
+        let now = |places| self.bvh.tree.sah_at(places);
         object
             .built_sah
             .map_or(1.0, |built| now(&object.places) / built)
@@ -248,21 +235,10 @@ impl World {
         let first = ground.or(objects().next()).map(Object::bvh);
         let recipe = Recipe::default();
         let isa = first.map_or(recipe.isa, Bvh::isa);
-        macro_rules! room {
-            ($variant:ident) => {{
-                let trees = ground.into_iter().chain(objects());
-                let trees = trees.filter_map(|object| match &object.bvh().tree {
-                    Tree::$variant(tree) => Some(tree),
-                    _ => None,
-                });
-                Tree::$variant(WideTree::with_room_for(&trees.collect::<Vec<_>>()))
-            }};
-        }
-        let tree = match first.map_or(recipe.width, Bvh::width) {
-            Width::W4 => room!(W4),
-            Width::W8 => room!(W8),
-            Width::W16 => room!(W16),
-        };
+        let width = first.map_or(recipe.width, Bvh::width);
+        let trees = ground.into_iter().chain(objects());
+        let trees: Vec<_> = trees.map(|object| &object.bvh().tree).collect();
+        let tree = Tree::with_room_for(width, &trees);
         let mut world = Self {
             bvh: Bvh::over_nothing(tree, isa),
             objects: Vec::new(),
@@ -289,10 +265,8 @@ impl World {
         self.join(ground, None)?;
         // No object after all: it lies in the world itself.
         let joined = self.objects.pop().expect("it has just joined");
-        self.ground = on_tree!(&mut self.bvh.tree, tree => {
-            tree.roots.clear();
-            Ground::new(tree, joined, instances)
-        });
+        self.bvh.tree.roots.clear();
+        self.ground = Ground::new(&mut self.bvh.tree, joined, instances);
         Ok(())
     }
 
@@ -350,7 +324,7 @@ impl World {
             let (object, geometries) = moved[index];
             let (places, kept) = self.places_of(object);
             let moved = Moved::new(geometries, kept)?;
-            on_tree!(&self.bvh.tree, tree => tree.check_moved(places, &moved))?;
+            self.bvh.tree.check_moved(places, &moved)?;
             Ok((object, moved))
         });
         checked.into_iter().collect()
@@ -376,24 +350,28 @@ impl World {
             .collect::<Vec<_>>();
         let (objects, ground) = (&mut self.objects, &mut self.ground);
         let moved: Vec<_> = moved.iter().map(|(object, _)| *object).collect();
-        on_tree!(&mut self.bvh.tree, tree => {
-            for &object in moved.iter().filter(|object| **object != Self::GROUND) {
-                let Joined { places, built_sah, .. } = &mut objects[object as usize];
-                built_sah.get_or_insert_with(|| tree.sah_at(places));
-            }
-            tree.refit(&jobs);
-            let shapes = map(moved.len(), 1, |index| {
-                let joined = objects.get(moved[index] as usize)?;
-                let bounds = tree.nodes[joined.places.nodes.start].all_bounds();
-                Some(ObjectShape::around(&bounds, tree.prim_bounds(&joined.places)))
-            });
-            for (object, shape) in moved.iter().zip(shapes) {
-                match shape {
-                    Some(shape) => objects[*object as usize].shape = shape,
-                    None => ground.measure(tree),
-                }
-            }
+        let tree = &mut self.bvh.tree;
+        for &object in moved.iter().filter(|object| **object != Self::GROUND) {
+            let Joined {
+                places, built_sah, ..
+            } = &mut objects[object as usize];
+            built_sah.get_or_insert_with(|| tree.sah_at(places));
+        }
+        tree.refit(&jobs);
+        let shapes = map(moved.len(), 1, |index| {
+            let joined = objects.get(moved[index] as usize)?;
+            let bounds = tree.nodes.get(joined.places.nodes.start).all_bounds();
+            Some(ObjectShape::around(
+                &bounds,
+                tree.prim_bounds(&joined.places),
+            ))
         });
+        for (object, shape) in moved.iter().zip(shapes) {
+            match shape {
+                Some(shape) => objects[*object as usize].shape = shape,
+                None => ground.measure(tree),
+            }
+        }
         for (instance, placement) in self.instances.iter().zip(&mut self.placements) {
             let place = instance.object.wrapping_add(1);
             let found = moved.binary_search_by_key(&place, |object| object.wrapping_add(1));
@@ -441,39 +419,42 @@ impl World {
             }
         }
         let ranks = (self.ranks).of(self.ground.items.len(), instances.len());
-        on_tree!(&mut self.bvh.tree, tree => {
-            let top = TopLevel::new(&items, &ranks);
-            if top.nodes.len() > self.top_room {
-                let room = TopLevel::<1>::most_nodes(items.len()).min(2 * top.nodes.len());
-                let by = room - self.top_room;
-                let found = tree.nodes.len() + by;
-                if found > Child::MAX_NODES {
-                    return Err(Error::TooMany { what: "nodes", found, limit: Child::MAX_NODES });
-                }
-                tree.make_room(self.top_room, by);
-                self.top_room = room;
-                for object in &mut self.objects {
-                    let nodes = &mut object.places.nodes;
-                    *nodes = nodes.start + by..nodes.end + by;
-                }
-                self.ground.move_back(by);
-                return self.place(instances);
+        let tree = &mut self.bvh.tree;
+        let top = TopLevel::new(&items, &ranks, tree.width());
+        if top.nodes.len() > self.top_room {
+            let room = TopLevel::most_nodes(items.len()).min(2 * top.nodes.len());
+            let by = room - self.top_room;
+            let found = tree.nodes.len() + by;
+            if found > Child::MAX_NODES {
+                return Err(Error::TooMany {
+                    what: "nodes",
+                    found,
+                    limit: Child::MAX_NODES,
+                });
             }
-            let placed = top.instances.iter().map(|&index| PlacedTree {
-                placement: placements[index as usize].expect("dropped ones are no items"),
-                root: self.objects[instances[index as usize].object as usize].root(),
-                object: instances[index as usize].object,
-                world_from_object: instances[index as usize].transform,
-            });
-            tree.set_top(&top.nodes, self.top_nodes, placed);
-            self.top_nodes = top.nodes.len();
-            tree.bounds = top.bounds;
-            tree.reach = top.bounds.reach();
-            let deepest = self.objects.iter().map(|object| object.depth);
-            tree.depth = top.depth + deepest.max().unwrap_or(0).max(self.ground.depth);
-            // An order that is looked up by node knows nothing of the new ones.
-            tree.pick = Rule::Slots;
+            tree.make_room(self.top_room, by);
+            self.top_room = room;
+            for object in &mut self.objects {
+                let nodes = &mut object.places.nodes;
+                *nodes = nodes.start + by..nodes.end + by;
+            }
+            self.ground.move_back(by);
+            return self.place(instances);
+        }
+        let placed = top.instances.iter().map(|&index| PlacedTree {
+            placement: placements[index as usize].expect("dropped ones are no items"),
+            root: self.objects[instances[index as usize].object as usize].root(),
+            object: instances[index as usize].object,
+            world_from_object: instances[index as usize].transform,
         });
+        tree.set_top(&top.nodes, self.top_nodes, placed);
+        self.top_nodes = top.nodes.len();
+        tree.bounds = top.bounds;
+        tree.reach = top.bounds.reach();
+        let deepest = self.objects.iter().map(|object| object.depth);
+        tree.depth = top.depth + deepest.max().unwrap_or(0).max(self.ground.depth);
+        // An order that is looked up by node knows nothing of the new ones.
+        tree.pick = Rule::Slots;
         let dropped = placements.iter().filter(|placement| placement.is_none());
         self.bvh.dropped = self.dropped_before + dropped.count();
         self.bvh.renew_masks();
@@ -492,7 +473,7 @@ impl Joined {
             shape: object.shape().clone(),
             kept: bvh.primitives + bvh.transparent,
             weight: instance_weight(bvh.primitives),
-            depth: on_tree!(&bvh.tree, tree => tree.depth),
+            depth: bvh.tree.depth,
             built_sah: bvh.built_sah,
         }
     }
@@ -503,16 +484,6 @@ impl Joined {
 }
 
 /// Copies an object into a tree.
-fn join<const N: usize>(
-    tree: &mut WideTree<N>,
-    object: &WideTree<N>,
-    number: Option<u32>,
-) -> Result<TreePlaces, Error> {
-    let places = tree.join(object, number)?;
-    tree.roots.push(places.nodes.start as u32);
-    Ok(places)
-}
-
 impl fmt::Debug for World {
     /// Counts, not contents.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -13,11 +13,10 @@ use crate::error::Error;
 use crate::geometry::instance::ObjectShape;
 use crate::geometry::primitives::PrimKind;
 use crate::geometry::{Functions, Instance};
-use crate::tree::any::on_tree;
 use crate::tree::node::{ChildKind, Leaf};
 use crate::tree::refit::TreePlaces;
 use crate::tree::validate::Walked;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 use crate::tree::words::{Kind, Sink, Words};
 
 impl Contents for World {
@@ -31,7 +30,7 @@ impl Contents for World {
         self.bvh.write_words(sink);
         sink.word(self.top_nodes as u32);
         sink.word(u32::try_from(self.dropped_before).unwrap_or(u32::MAX));
-        let all = on_tree!(&self.bvh.tree, tree => tree.all_places());
+        let all = self.bvh.tree.all_places();
         let first = self.objects.first().map(|object| &object.places);
         let of_ground = all.blocks.iter().enumerate();
         for (kind, blocks) in of_ground {
@@ -59,12 +58,9 @@ impl Contents for World {
     fn read_words(words: &mut Words<'_>, functions: &Functions) -> Result<Self, Error> {
         let (bvh, walked) = Bvh::read_tree(words, functions)?;
         let [top_nodes, dropped_before] = words.words()?.map(|count| count as usize);
-        let (mut ground, objects) = on_tree!(&bvh.tree, tree => {
-            let ground = read_ground(words, tree, top_nodes, &walked)?;
-            let ends = core::array::from_fn(|kind| ground.places.blocks[kind].end);
-            let objects = read_objects(words, tree, ends, &walked)?;
-            (ground, objects)
-        });
+        let mut ground = read_ground(words, &bvh.tree, top_nodes, &walked)?;
+        let ends = core::array::from_fn(|kind| ground.places.blocks[kind].end);
+        let objects = read_objects(words, &bvh.tree, ends, &walked)?;
         let all = bvh.primitives + bvh.transparent;
         let of_ground =
             (objects.iter()).try_fold(all, |rest, object| rest.checked_sub(object.kept));
@@ -80,15 +76,18 @@ impl Contents for World {
             Ok(Instance::new(object, transform))
         })?;
         let mut placements = vec![None; instances.len()];
-        on_tree!(&bvh.tree, tree => for placed in &tree.instances {
+        for placed in &bvh.tree.instances {
             let index = placed.placement.inst_id as usize;
             let object = instances.get(index).map(|instance| instance.object);
             let is_own = |object: u32| objects[object as usize].root() == placed.root;
-            if !object.is_some_and(is_own) || object != Some(placed.object) || placements[index].is_some() {
+            if !object.is_some_and(is_own)
+                || object != Some(placed.object)
+                || placements[index].is_some()
+            {
                 return Err(words.error("an instance is not where it belongs"));
             }
             placements[index] = Some(placed.placement);
-        });
+        }
         Ok(Self {
             bvh,
             objects,
@@ -105,9 +104,9 @@ impl Contents for World {
 }
 
 /// The ground is what the top level refers to, but for instances. How many primitives it has is left to the caller.
-fn read_ground<const N: usize>(
+fn read_ground(
     words: &mut Words<'_>,
-    tree: &WideTree<N>,
+    tree: &Tree,
     top_nodes: usize,
     walked: &Walked,
 ) -> Result<Ground, Error> {
@@ -121,7 +120,7 @@ fn read_ground<const N: usize>(
         ..Ground::default()
     };
     let mut first = end;
-    for (index, node) in tree.nodes[..end].iter().enumerate() {
+    for (index, node) in tree.nodes.iter().take(end).enumerate() {
         let is_top = index < top_nodes;
         for slot in 0..node.len() {
             let child = node.child(slot);
@@ -145,9 +144,9 @@ fn read_ground<const N: usize>(
 
 /// Places of a tree with these nodes. Its blocks begin where the blocks of the tree before end. Its leaves are among
 /// its blocks.
-fn read_places<const N: usize>(
+fn read_places(
     words: &mut Words<'_>,
-    tree: &WideTree<N>,
+    tree: &Tree,
     nodes: Range<usize>,
     start: [usize; PrimKind::COUNT],
 ) -> Result<TreePlaces, Error> {
@@ -162,7 +161,7 @@ fn read_places<const N: usize>(
     let mut is_own = ends
         .clone()
         .all(|(own, all)| own.start <= own.end && own.end <= all.end);
-    for node in &tree.nodes[places.nodes.clone()] {
+    for node in places.nodes.clone().map(|index| tree.nodes.get(index)) {
         for slot in 0..node.len() {
             if let ChildKind::Leaf(Leaf { kind, index }) = node.child(slot).kind() {
                 is_own &= places.blocks[kind as usize].contains(&index);
@@ -177,9 +176,9 @@ fn read_places<const N: usize>(
 }
 
 /// The objects of a world, whose blocks begin where the blocks of the ground end.
-fn read_objects<const N: usize>(
+fn read_objects(
     words: &mut Words<'_>,
-    tree: &WideTree<N>,
+    tree: &Tree,
     mut start: [usize; PrimKind::COUNT],
     walked: &Walked,
 ) -> Result<Vec<Joined>, Error> {
@@ -199,7 +198,7 @@ fn read_objects<const N: usize>(
             kept,
             weight,
             built_sah: words.double()?,
-            shape: ObjectShape::read(words, tree.nodes[root].all_bounds().reach())?,
+            shape: ObjectShape::read(words, tree.nodes.get(root).all_bounds().reach())?,
             places,
             depth: walked.levels(root),
         });

@@ -4,15 +4,19 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::passage::Passage;
+use crate::order::AS_THEY_ARE;
 use crate::order::arrange::{Costs, EXACT, arrange};
+use crate::tree::node::{MAX_WIDTH, PerSlot};
 
 /// The order in which children that occlude any ray come first, as is cheapest, and the others follow in the order of
 /// `ratio`.
-pub(crate) fn least_cost<const N: usize>(passages: &[Passage<N>], ratio: &[u8; N]) -> [u8; N] {
+pub(super) fn least_cost(passages: &[Passage], ratio: &[u8]) -> PerSlot<u8> {
     let any = passages
         .iter()
         .fold(0, |any, passage| any | passage.occluding);
-    let mut order = *ratio;
+    let mut all = AS_THEY_ARE;
+    let order = &mut all[..ratio.len()];
+    order.copy_from_slice(ratio);
     order.sort_by_key(|slot| any >> slot & 1 == 0);
     let first = &mut order[..any.count_ones() as usize];
     let groups = Groups::new(passages, first);
@@ -23,29 +27,29 @@ pub(crate) fn least_cost<const N: usize>(passages: &[Passage<N>], ratio: &[u8; N
     };
     let slots: Vec<_> = arranged.into_iter().map(|thing| first[thing]).collect();
     first.copy_from_slice(&slots);
-    order
+    all
 }
 
 /// Rays that the same children occlude stop together, so that it is enough to know the sums of their costs.
 /// Children are numbered as they were given.
-struct Groups<const N: usize> {
+struct Groups {
     len: usize,
-    groups: Vec<Group<N>>,
+    groups: Vec<Group>,
 }
 
 /// Rays that the same children occlude.
-struct Group<const N: usize> {
+struct Group {
     /// The children that occlude them.
     occluding: u32,
     /// Sum of the weights of the rays.
     weight: f64,
     /// Sums of the costs of each child, weighted.
-    costs: [f64; N],
+    costs: PerSlot<f64>,
 }
 
-impl<const N: usize> Groups<N> {
+impl Groups {
     /// Groups for the order of only these children.
-    fn new(passages: &[Passage<N>], children: &[u8]) -> Self {
+    fn new(passages: &[Passage], children: &[u8]) -> Self {
         // Rays that nothing occludes cost the same in any order; so do those that hit but one box.
         let mut stopped: Vec<_> = passages
             .iter()
@@ -61,13 +65,12 @@ impl<const N: usize> Groups<N> {
                 let mut group = Group {
                     occluding,
                     weight: 0.0,
-                    costs: [0.0; N],
+                    costs: [0.0; MAX_WIDTH],
                 };
                 for passage in passages {
-                    let weight = passage.weight;
-                    group.weight += weight;
+                    group.weight += passage.weight;
                     for (cost, &slot) in group.costs.iter_mut().zip(children) {
-                        *cost += weight * passage.costs[slot as usize];
+                        *cost += passage.weight * passage.costs[slot as usize];
                     }
                 }
                 group
@@ -103,7 +106,7 @@ impl<const N: usize> Groups<N> {
     }
 }
 
-impl<const N: usize> Costs for Groups<N> {
+impl Costs for Groups {
     fn cost(&self, child: usize, before: u32) -> f64 {
         let mut sum = 0.0;
         for group in &self.groups {

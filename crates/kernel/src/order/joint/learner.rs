@@ -1,4 +1,4 @@
-//! The walk through the nodes of a tree that learns the order of each.
+//! The walk through the nodes of a tree that learns the orders of all of them.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -8,20 +8,21 @@ use super::passage::{Passage, by_ratio};
 use crate::learn::ray_log::{RayLog, Visit};
 use crate::order::sorted_slots;
 use crate::tree::costs::CostModel;
-use crate::tree::node::{ChildKind, Node};
-use crate::tree::wide::WideTree;
+use crate::tree::node::{ChildKind, MAX_WIDTH, NodeRef, PerSlot};
+use crate::tree::slot_order::SlotOrder;
+use crate::tree::wide::Tree;
 
 /// How often all nodes are sorted. See `docs/notes/kernel.md`.
 const ROUNDS: usize = 2;
 
 /// Weight of a ray in a node that it does not come to, because something occludes it before. See
 /// `docs/notes/kernel.md`.
-const STOPPED: f64 = 0.05;
+pub(crate) const STOPPED: f64 = 0.05;
 
 /// Goes through the nodes, children first, with the costs of the nodes below known.
-pub(crate) struct Learner<'a, const N: usize> {
-    bvh: &'a WideTree<N>,
-    model: &'a CostModel,
+pub(crate) struct Learner<'a> {
+    pub tree: &'a Tree,
+    pub model: &'a CostModel,
     pub visits: &'a [Visit],
     /// Visits by node, and where the visits of each node begin. In an order that depends on nothing but the rays, so
     /// that sums come out the same.
@@ -30,18 +31,18 @@ pub(crate) struct Learner<'a, const N: usize> {
     /// Cost of each visit, once its node is sorted.
     pub costs: Vec<f64>,
     /// Whether the ray comes to the node of each visit.
-    arrives: Vec<bool>,
-    passages: Vec<Passage<N>>,
+    pub arrives: Vec<bool>,
+    pub passages: Vec<Passage>,
 }
 
-impl<'a, const N: usize> Learner<'a, N> {
-    pub fn new(bvh: &'a WideTree<N>, log: &'a RayLog, model: &'a CostModel) -> Self {
+impl<'a> Learner<'a> {
+    pub fn new(tree: &'a Tree, log: &'a RayLog, model: &'a CostModel) -> Self {
         let visits = log.visits();
-        let mut firsts = vec![0; bvh.nodes.len() + 1];
+        let mut firsts = vec![0; tree.nodes.len() + 1];
         for visit in visits {
             firsts[visit.node as usize + 1] += 1;
         }
-        for node in 0..bvh.nodes.len() {
+        for node in 0..tree.nodes.len() {
             firsts[node + 1] += firsts[node];
         }
         let mut ends = firsts.clone();
@@ -54,7 +55,7 @@ impl<'a, const N: usize> Learner<'a, N> {
             }
         }
         Self {
-            bvh,
+            tree,
             model,
             visits,
             places,
@@ -66,32 +67,33 @@ impl<'a, const N: usize> Learner<'a, N> {
     }
 
     /// The orders of all nodes.
-    pub fn learn(&mut self) -> Vec<[u8; N]> {
-        let mut by_node = self.sort_all();
+    pub fn learn(&mut self) -> SlotOrder {
+        let mut order = self.sort_all();
         for _ in 1..ROUNDS {
-            self.trace(&by_node);
-            by_node = self.sort_all();
+            self.trace(&order);
+            order = self.sort_all();
         }
-        by_node
+        order
     }
 
     /// Finds the orders of all nodes for the rays that arrive.
-    pub fn sort_all(&mut self) -> Vec<[u8; N]> {
-        let mut by_node = vec![[0; N]; self.bvh.nodes.len()];
+    pub fn sort_all(&mut self) -> SlotOrder {
+        let mut order = SlotOrder::of_nodes(self.tree.shape());
         // Children follow their parents, so going backwards visits them first.
-        for (node, order) in by_node.iter_mut().enumerate().rev() {
-            *order = self.sort(node);
+        for node in (0..self.tree.nodes.len()).rev() {
+            order.set(node, &self.sort(node));
         }
-        by_node
+        order
     }
 
     /// Finds out how far the rays come in these orders.
-    fn trace(&mut self, by_node: &[[u8; N]]) {
+    fn trace(&mut self, order: &SlotOrder) {
+        let width = self.tree.width().lanes();
         // A visit comes before the visits below it.
         for (place, visit) in self.visits.iter().enumerate() {
             let mut entered = 0;
             if self.arrives[place] {
-                for slot in by_node[visit.node as usize] {
+                for slot in &order.slots[visit.node as usize * width..][..width] {
                     entered |= 1 << slot;
                     if visit.occluding >> slot & 1 == 1 {
                         break;
@@ -99,30 +101,32 @@ impl<'a, const N: usize> Learner<'a, N> {
                 }
             }
             let mut below = place + 1;
-            for slot in (0..N).filter(|slot| visit.followed >> slot & 1 == 1) {
+            for slot in (0..width).filter(|slot| visit.followed >> slot & 1 == 1) {
                 self.arrives[below] = entered >> slot & 1 == 1;
                 below += self.visits[below].len as usize;
             }
         }
     }
 
-    /// Finds the order of a node, the nodes below it being done.
-    fn sort(&mut self, index: usize) -> [u8; N] {
-        let node = &self.bvh.nodes[index];
+    /// Finds the orders of a node, the nodes below it being done.
+    fn sort(&mut self, index: usize) -> PerSlot<u8> {
+        let node = self.tree.nodes.get(index);
         self.gather(index);
         if self.passages.is_empty() {
-            return sorted_slots(node, &[0.0; N]);
+            return sorted_slots(node, &[0.0; MAX_WIDTH]);
         }
-        let order = least_cost(&self.passages, &by_ratio(node, &self.passages));
+        let ratio = by_ratio(node, &self.passages);
+        let order = least_cost(&self.passages, &ratio[..node.width()]);
         for passage in &self.passages {
-            self.costs[passage.visit] = f64::from(self.model.node) + passage.cost(&order);
+            let cost = passage.cost(&order[..node.width()]);
+            self.costs[passage.visit] = f64::from(self.model.node) + cost;
         }
         order
     }
 
     /// Collects the rays in a node and what each child costs each of them.
-    fn gather(&mut self, index: usize) {
-        let fixed = self.fixed_costs(&self.bvh.nodes[index]);
+    pub fn gather(&mut self, index: usize) {
+        let fixed = self.fixed_costs(self.tree.nodes.get(index));
         self.passages.clear();
         for &place in &self.places[self.firsts[index]..self.firsts[index + 1]] {
             let visit = place as usize;
@@ -132,7 +136,7 @@ impl<'a, const N: usize> Learner<'a, N> {
                 followed,
                 ..
             } = self.visits[visit];
-            let mut costs = [0.0; N];
+            let mut costs = [0.0; MAX_WIDTH];
             let mut below = visit + 1;
             for (slot, cost) in costs.iter_mut().enumerate() {
                 if hit >> slot & 1 == 1 {
@@ -154,12 +158,12 @@ impl<'a, const N: usize> Learner<'a, N> {
     }
 
     /// Cost of entering each child for every ray that hits its box, without the costs of the nodes below.
-    fn fixed_costs(&self, node: &Node<N>) -> [f64; N] {
-        let mut fixed = [0.0; N];
+    fn fixed_costs(&self, node: NodeRef<'_>) -> PerSlot<f64> {
+        let mut fixed = [0.0; MAX_WIDTH];
         for (slot, cost) in fixed.iter_mut().enumerate().take(node.len()) {
             *cost = match node.child(slot).kind() {
                 ChildKind::Inner(_) => 0.0,
-                ChildKind::Leaf(leaf) => self.bvh.leaf_cost(leaf, self.model),
+                ChildKind::Leaf(leaf) => self.tree.leaf_cost(leaf, self.model),
                 ChildKind::Instance(_) => f64::from(self.model.entry),
             };
         }

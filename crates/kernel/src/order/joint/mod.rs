@@ -1,4 +1,4 @@
-//! The order of least measured cost: it minimises what the rays of a log would really have cost, without the
+//! The orders of least measured cost: they minimise what the rays of a log would really have cost, without the
 //! assumption of the paper's model that hits of different children are independent.
 //!
 //! The log says of every ray and every node that it comes to which boxes it hits and below which of them something
@@ -16,10 +16,10 @@
 //! sorted. Rays that something else occludes before count little then, but not nothing (`STOPPED`), so that few rays do
 //! not decide by themselves.
 //!
-//! - `learner`: the walk through all nodes;  `passage`: rays in one node;  `groups`: the cheapest order of one node
+//! - `learner`: the walk through all nodes;  `passage`: rays in one node;  `groups`: the cheapest order there
 
 mod groups;
-mod learner;
+pub(crate) mod learner;
 mod passage;
 #[cfg(test)]
 mod tests;
@@ -27,27 +27,18 @@ mod tests;
 use crate::error::Error;
 use crate::learn::log::Log;
 use crate::order::Order;
-use crate::order::ratio::sorted_lanes;
+use crate::order::ratio::all_sorted_lanes;
 use crate::tree::costs::CostModel;
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
+
 use learner::Learner;
 
 /// Works out the order of least measured cost.
-pub(crate) fn plan<const N: usize>(
-    bvh: &WideTree<N>,
-    log: &Log,
-    model: &CostModel,
-) -> Result<SlotOrder, Error> {
-    Error::unless_fits(log.shape(), bvh.shape())?;
+pub(crate) fn plan(tree: &Tree, log: &Log, model: &CostModel) -> Result<SlotOrder, Error> {
+    Error::unless_fits(log.shape(), tree.shape())?;
     let rays = log.masks().ok_or(Error::NeedsMasks(Order::Joint.name()))?;
-    let by_node = Learner::new(bvh, rays, model).learn();
-    let lanes = (0..bvh.leaf_count())
-        .map(|leaf| sorted_lanes(log.prim_hits(leaf)))
-        .collect();
-    Ok(SlotOrder {
-        slots: by_node.into_flattened(),
-        lanes,
-        ..SlotOrder::as_built(bvh.shape())
-    })
+    let mut order = Learner::new(tree, rays, model).learn();
+    order.lanes = all_sorted_lanes(tree, log);
+    Ok(order)
 }

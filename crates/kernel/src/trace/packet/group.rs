@@ -78,7 +78,7 @@ pub(crate) fn is_above(normal: [f32; 3], dir: [f32; 3]) -> bool {
 /// Finds which rays of rows nothing is in the way of, until so many rays are left to others that these should be traced.
 /// Returns the row to go on with.
 pub(crate) struct GroupQuery<'a, const N: usize> {
-    pub bvh: &'a WideTree<N>,
+    pub bvh: &'a WideTree<'a, N>,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [u32],
     pub rows: &'a Rows<'a>,
@@ -231,7 +231,7 @@ impl<const N: usize> WithSimd<N> for GroupQuery<'_, N> {
 
 /// Tree, points and directions, for packets of either way.
 pub(super) struct Way<'a, const N: usize> {
-    pub bvh: &'a WideTree<N>,
+    pub bvh: &'a WideTree<'a, N>,
     pub rows: &'a Rows<'a>,
     pub sheaves: &'a [Sheaf],
 }

@@ -77,7 +77,7 @@ impl Luck {
 
 /// A packet ready to be traced.
 pub(crate) struct Packet<'a, const N: usize> {
-    bvh: &'a WideTree<N>,
+    bvh: &'a WideTree<'a, N>,
     rays: &'a PacketRays,
     frustum: &'a Frustum,
     /// Lanes whose rays are traced, as bits.
@@ -162,7 +162,7 @@ pub(crate) trait PacketQuery: StreamQuery {
 
 /// Answers the rays that go in packets, and lists the others.
 pub(crate) struct Packets<'a, Q: PacketQuery, const N: usize> {
-    pub bvh: &'a WideTree<N>,
+    pub bvh: &'a WideTree<'a, N>,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [Q::Item],
     pub batch: &'a RayBatch<'a>,
