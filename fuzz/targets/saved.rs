@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Opacity};
-use antumbra::lab::{Log, SlotOrder};
+use antumbra::parts::{Log, SlotOrder};
 use antumbra::{
     Aabb, Bvh, Functions, Instance, Isa, Object, Ray, Saved, UserGeometry, UserHit, World,
 };

@@ -26,7 +26,7 @@ pub(crate) fn of_ray(seed: u64, ray: &Ray) -> u64 {
 }
 
 /// SplitMix64 (Steele, Lea and Flood 2014).
-pub(crate) struct Random(u64);
+pub struct Random(u64);
 
 impl Random {
     /// The numbers of one ray.
@@ -34,6 +34,7 @@ impl Random {
         Self(Self(seed ^ Self(index as u64).bits()).bits())
     }
 
+    /// The next number.
     pub fn bits(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(STEP);
         mixed(self.0)

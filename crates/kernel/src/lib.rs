@@ -78,7 +78,6 @@
 //!   it the kernel needs only `alloc`, takes the instruction set that it is compiled for, and a batch takes memory from
 //!   the allocator.
 //! - `bytemuck`: `Pod` for [`Ray`] and [`Hit`].
-//! - `lab`: builders, collapses and child orders for comparisons, training logs, and queries that count. Off by default.
 //!
 //! WebAssembly runs on the level `simd128` where the program is compiled with `-C target-feature=+simd128`, and otherwise in
 //! plain code, with the same bits.
@@ -100,8 +99,6 @@ mod collapse;
 mod error;
 mod geometry;
 mod hash;
-#[cfg(feature = "lab")]
-pub mod lab;
 mod learn;
 #[cfg(test)]
 mod list_tests;
@@ -168,6 +165,66 @@ pub mod recipe {
     pub use crate::collapse::Collapse;
     pub use crate::order::Order;
     pub use crate::tree::costs::CostModel;
+}
+
+/// What trees are made of and learn from, for builders, collapses and child orders of your own, and for queries that are
+/// observed.
+///
+/// A [`Recipe`] names what the kernel has. Others plug in: a builder as [`Builder::Other`](recipe::Builder::Other), a
+/// collapse as [`Collapse::Other`](recipe::Collapse::Other), a child order as [`Order::Other`](recipe::Order::Other).
+/// None of them changes an answer.
+///
+/// - [`Grow`](parts::Grow) makes a [`BinaryTree`](parts::BinaryTree).
+/// - [`Contract`](parts::Contract) says which of its nodes become nodes of the wide tree, for training rays in a
+///   [`TreeLog`](parts::TreeLog).
+/// - [`Plan`](parts::Plan) puts the children of every node of a wide [`Tree`](parts::Tree) in order, for training rays in a
+///   [`Log`](parts::Log).
+/// - [`Steps`](parts::Steps) has the steps of learning one by one, and queries that count what they do;
+///   [`observe`](parts::observe) tells an [`Observer`](parts::Observer) all of it.
+///
+/// ```
+/// use antumbra::parts::{Cost, Steps};
+/// use antumbra::recipe::Order;
+/// use antumbra::{Build, Geometry, Ray, Recipe};
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// let rays = [Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])];
+///
+/// // One binary tree, many orders.
+/// let stage = Build::new(&geometry).stage()?;
+/// for order in Order::ALL {
+///     let bvh = stage.learn(&rays, &Recipe::default().order(order), &())?;
+///     let (mut occluded, mut costs) = ([false], [Cost::default()]);
+///     bvh.occluded_batch_counted(&rays, &mut occluded, &mut costs);
+///     assert_eq!((occluded[0], costs[0].node_tests), (true, 1));
+/// }
+/// # Ok::<(), antumbra::Error>(())
+/// ```
+pub mod parts {
+    pub use antumbra_simd::Row;
+
+    pub use crate::api::steps::{Steps, observe};
+    pub use crate::builder::Grow;
+    pub use crate::builder::binned_sah::subtree as binned_subtree;
+    pub use crate::builder::cost::Cost as SplitCost;
+    pub use crate::collapse::skeleton::{Children, Contraction};
+    pub use crate::collapse::{Contract, Contractor, Learning};
+    pub use crate::geometry::BLOCK;
+    pub use crate::geometry::primitives::PrimKind;
+    pub use crate::geometry::ray_setup::{RaySetup, is_sane};
+    pub use crate::hash::Random;
+    pub use crate::learn::surface_rays::surface_rays;
+    pub use crate::learn::{Log, LogKind, TreeLog};
+    pub use crate::order::Plan;
+    pub use crate::order::arrange::{Costs, arrange};
+    pub use crate::order::ratio::{ChildCost, area_shares, cost_any};
+    pub use crate::trace::binary::{LeafHits, Witness, follow};
+    pub use crate::trace::observe::{Cost, NodeVisit, Observer, Place};
+    pub use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
+    pub use crate::tree::node::{ChildKind, Leaf, MAX_WIDTH, NodeRef, PerSlot};
+    pub use crate::tree::slot_order::SlotOrder;
+    pub use crate::tree::wide::Tree;
 }
 
 /// Partly transparent triangles: leaves cut out of rectangles, nets, veils.

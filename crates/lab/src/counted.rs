@@ -1,6 +1,6 @@
 //! Answers of occlusion rays with what they cost.
 
-use antumbra::lab::{Cost, Laboratory};
+use antumbra::parts::{Cost, Steps};
 use antumbra::{Bvh, Ray};
 use rayon::prelude::*;
 

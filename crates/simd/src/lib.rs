@@ -62,4 +62,4 @@ pub use doubles::Doubles;
 pub use fresh::fresh;
 pub use lanes::{Lanes, Mask};
 pub use level::{Dispatch, Isa, Level, Simd, Unavailable, Width, WithSimd};
-pub use list::UnknownName;
+pub use list::{Row, UnknownName};

@@ -27,20 +27,34 @@ impl fmt::Display for UnknownName {
 
 impl core::error::Error for UnknownName {}
 
+/// What a named list says of an entry, for entries that are in no table.
+pub trait Row: Send + Sync {
+    /// Name on the command line and in results.
+    fn name(&self) -> &'static str;
+
+    /// One sentence that describes the entry, without a full stop.
+    fn sentence(&self) -> &'static str;
+
+    /// Authors and year of the paper it comes from; `None` for one's own and for folklore.
+    fn source(&self) -> Option<&'static str>;
+}
+
 /// Declares an enum as a table with one row per variant; for the crates of this project.
 ///
 /// `Variant = "name", "Sentence", source, properties;` where the sentence has no full stop, the source is an
-/// `Option<&'static str>`, and the properties are a value of the type named behind the enum. With
-/// `Variant if "feature" = ...` the row exists only where the crate has that feature.
+/// `Option<&'static str>`, and the properties are a value of the type named behind the enum. With `open Trait` behind
+/// the properties, the enum also has a variant `Other` for entries that are in no table: whatever implements the trait,
+/// which has [`Row`] above it. Two of them are the same if their names are. The properties are then made by
+/// `of(&dyn Trait)`.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! named_list {
     (
         $(#[$meta:meta])*
-        pub enum $list:ident($kind:literal): $properties:ty {
+        pub enum $list:ident($kind:literal): $properties:ty $(, open $Other:ident)? {
             $(
                 $(#[$more:meta])*
-                $variant:ident $(if $feature:literal)? = $name:literal, $sentence:literal, $source:expr, $row:expr;
+                $variant:ident = $name:literal, $sentence:literal, $source:expr, $row:expr;
             )*
         }
     ) => {
@@ -49,36 +63,41 @@ macro_rules! named_list {
         #[non_exhaustive]
         pub enum $list {
             $(
-                $(#[cfg(feature = $feature)])?
                 #[doc = concat!($sentence, ".")]
                 $(#[$more])*
                 $variant,
             )*
+            $(
+                #[doc = concat!("One that is in no table: see [`", stringify!($Other), "`].")]
+                Other(&'static dyn $Other),
+            )?
         }
 
         impl $list {
             /// Every row, in the order of the table.
-            pub const ALL: [Self; [$($(#[cfg(feature = $feature)])? $name),*].len()] =
-                [$($(#[cfg(feature = $feature)])? Self::$variant),*];
+            pub const ALL: [Self; [$($name),*].len()] = [$(Self::$variant),*];
 
             /// Name on the command line, in scene files and in results.
-            pub const fn name(self) -> &'static str {
+            pub fn name(self) -> &'static str {
                 match self {
-                    $($(#[cfg(feature = $feature)])? Self::$variant => $name,)*
+                    $(Self::$variant => $name,)*
+                    $(Self::Other(row) => <dyn $Other as $crate::Row>::name(row),)?
                 }
             }
 
             /// One sentence that describes the entry, without a full stop.
-            pub const fn sentence(self) -> &'static str {
+            pub fn sentence(self) -> &'static str {
                 match self {
-                    $($(#[cfg(feature = $feature)])? Self::$variant => $sentence,)*
+                    $(Self::$variant => $sentence,)*
+                    $(Self::Other(row) => <dyn $Other as $crate::Row>::sentence(row),)?
                 }
             }
 
             /// Authors and year of the paper it comes from; `None` for our own and for folklore.
-            pub const fn source(self) -> Option<&'static str> {
+            pub fn source(self) -> Option<&'static str> {
                 match self {
-                    $($(#[cfg(feature = $feature)])? Self::$variant => $source,)*
+                    $(Self::$variant => $source,)*
+                    $(Self::Other(row) => <dyn $Other as $crate::Row>::source(row),)?
                 }
             }
 
@@ -89,12 +108,38 @@ macro_rules! named_list {
 
             /// The columns that only this list has.
             #[allow(dead_code, reason = "not every list has columns of its own")]
-            pub(crate) const fn properties(self) -> $properties {
+            pub(crate) fn properties(self) -> $properties {
                 match self {
-                    $($(#[cfg(feature = $feature)])? Self::$variant => $row,)*
+                    $(Self::$variant => $row,)*
+                    $(Self::Other(row) => {
+                        let row: &dyn $Other = row;
+                        <$properties>::of(row)
+                    },)?
                 }
             }
         }
+
+        $(
+            impl PartialEq for dyn $Other {
+                fn eq(&self, other: &Self) -> bool {
+                    self.name() == other.name()
+                }
+            }
+
+            impl Eq for dyn $Other {}
+
+            impl core::hash::Hash for dyn $Other {
+                fn hash<H: core::hash::Hasher>(&self, state: &mut H) {
+                    self.name().hash(state);
+                }
+            }
+
+            impl core::fmt::Debug for dyn $Other {
+                fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+                    f.write_str(self.name())
+                }
+            }
+        )?
 
         impl core::fmt::Display for $list {
             fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {

@@ -4,7 +4,7 @@
 use std::fmt;
 use std::hint::black_box;
 
-use antumbra::lab::steps::Steps;
+use antumbra::parts::steps::Steps;
 use antumbra::recipe::{Collapse, Order};
 use antumbra::{Bvh, Geometry, Hit, Isa, Ray, Recipe, Width};
 use antumbra_testkit::{mesh, rng::Rng};

@@ -4,6 +4,7 @@ use alloc::vec::Vec;
 
 use super::bvh::Bvh;
 use super::recipe::Recipe;
+use super::steps::Steps;
 use crate::learn::Log;
 use crate::order::AS_THEY_ARE;
 use crate::ray::Ray;
@@ -172,7 +173,6 @@ impl Bvh {
         let log = self
             .learn_order(rays, None, recipe)
             .expect("the log is made here, of this tree and as the order needs it");
-        self.choose_prefetch(rays, recipe);
         log.map_or_else(ChildOrder::default, |log| {
             ChildOrder::of(&self.tree, first, &log)
         })
@@ -190,7 +190,7 @@ mod tests {
     use antumbra_testkit::{Rng, mesh};
 
     use super::*;
-    use crate::lab::{Cost, Laboratory};
+    use crate::parts::{Cost, Steps};
     use crate::{Geometry, Width};
 
     /// A tree that learned from some rays and learns again from others gives the same answers, with fewer tests.

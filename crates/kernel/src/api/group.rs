@@ -15,7 +15,6 @@ use crate::trace::query::Occlusion;
 use crate::trace::ray_batch::RayBatch;
 use crate::trace::stack::stack_size;
 use crate::tree::any::on_tree;
-use crate::tree::rule::Rule;
 
 /// Rays that one thread takes at a time, about.
 const RAYS: usize = 1 << 20;
@@ -217,7 +216,7 @@ impl Bvh {
         open: &mut [u64],
     ) {
         let words = open.len() / rows.points.len();
-        let goes_together = self.isa().level() != Level::Scalar && self.rule() == &Rule::Slots;
+        let goes_together = self.isa().level() != Level::Scalar && self.tree.pick.is_none();
         let mut pending = Vec::new();
         let mut experience = Experience::default();
         let mut next = 0;

@@ -5,7 +5,7 @@
 //! - `save`: trees, objects and worlds in files
 //! - `object`: a tree to be placed in worlds;  `world`: objects that are placed, and move
 //! - `refit`: other vertices in the same tree;  `points`: what is near a point or around it
-//! - `stage`: a binary tree that can still learn;  `learning`: the steps of learning
+//! - `stage`: a binary tree that can still learn;  `steps`: the steps of learning one by one
 //! - `single`: queries of one ray, and the normal of a hit
 //! - `ray_query`: queries of one ray with masks and filters, and visits of all its hits
 //! - `batch`: queries of many rays;  `hit_lists`: all hits of many rays;  `visit_many`: visits of them, with a state
@@ -20,7 +20,6 @@ pub(crate) mod bvh;
 pub(crate) mod child_order;
 pub(crate) mod group;
 pub(crate) mod hit_lists;
-pub(crate) mod learning;
 pub(crate) mod moving;
 pub(crate) mod object;
 pub(crate) mod points;
@@ -35,6 +34,7 @@ pub(crate) mod report;
 pub(crate) mod save;
 mod single;
 pub(crate) mod stage;
+pub(crate) mod steps;
 pub(crate) mod times;
 mod visit_many;
 pub(crate) mod world;

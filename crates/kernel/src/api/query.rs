@@ -7,59 +7,26 @@ use antumbra_simd::{Dispatch, Level};
 
 use super::batch::CHUNK;
 use super::bvh::Bvh;
-use crate::error::Error;
 use crate::geometry::ray_setup::RaySetup;
-use crate::learn::log::{Log, Logging};
 use crate::learn::ray_log::{Following, RayLog};
 use crate::ray::{Hit, Ray};
 use crate::trace::closest_with_leaf::closest_with_leaf;
 use crate::trace::instrumented::Instrumented;
 use crate::trace::memory::{Memory, Stored};
-#[cfg(feature = "lab")]
-use crate::trace::observe::Nothing;
-use crate::trace::observe::{Cost, Counting, Observer};
+use crate::trace::observe::{Cost, Counting, Nothing, Observer};
 use crate::trace::packet::{PacketQuery, Packets};
-use crate::trace::pick::{Pick, Shuffle};
+use crate::trace::pick::Pick;
 use crate::trace::query::{Closest, Occlusion, Query, StreamQuery};
 use crate::trace::ray_batch::RayBatch;
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::trace::stream::{self, Stream};
 use crate::tree::any::on_tree;
-use crate::tree::rule::Rule;
 
 /// Fewer rays than this are not worth a stream.
 pub(super) const FEW: usize = 12;
 
 impl Bvh {
-    /// Whether anything lies in the interval of each ray, and what each ray cost, on the calling thread. The rays are
-    /// written to `log`, in whose shuffled mode children are visited in random order.
-    ///
-    /// # Panics
-    /// If the slices differ in length, or the log was made for a tree of another shape.
-    pub(crate) fn occluded_batch_logged(
-        &self,
-        rays: &[Ray],
-        occluded: &mut [bool],
-        costs: &mut [Cost],
-        log: &mut Log,
-    ) {
-        assert_eq!(rays.len(), costs.len(), "one cost per ray");
-        if let Err(error) = Error::unless_fits(log.shape(), self.shape()) {
-            panic!("{error}");
-        }
-        let pick = if log.kind().shuffled {
-            Pick::Shuffled(Shuffle::new(log.seed()))
-        } else {
-            Pick::Rule
-        };
-        let mut observer = Logging::new(self.counting(costs), log);
-        self.observe(pick, &mut observer, rays, occluded);
-        if let Some(masks) = log.masks_mut() {
-            self.follow(rays, masks);
-        }
-    }
-
     /// Follows rays to their ends, whatever they hit on the way, and logs the boxes and occluders that they hit.
     pub(crate) fn follow(&self, rays: &[Ray], log: &mut RayLog) {
         let mut occluded = vec![false; rays.len()];
@@ -74,7 +41,7 @@ impl Bvh {
         occluded: &mut [bool],
     ) {
         assert_eq!(batch.rays.len(), occluded.len(), "one answer per ray");
-        if self.is_worth_a_stream(batch.rays.len()) && self.rule() == &Rule::Slots {
+        if self.is_worth_a_stream(batch.rays.len()) && self.tree.pick.is_none() {
             return self.many::<Occlusion>(memory, batch, occluded);
         }
         if !batch.decides() {
@@ -149,10 +116,9 @@ impl Bvh {
 
     /// Occlusion ray by ray.
     pub(crate) fn occluded_each(&self, memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]) {
-        match self.rule() {
-            Rule::Slots => self.each::<Occlusion>(memory, rays, occluded),
-            #[cfg(feature = "lab")]
-            _ => self.instrumented(memory, Pick::Rule, &mut Nothing, rays, occluded),
+        match self.tree.pick {
+            None => self.each::<Occlusion>(memory, rays, occluded),
+            Some(_) => self.instrumented(memory, Pick::Rule, &mut Nothing, rays, occluded),
         }
     }
 
@@ -274,10 +240,6 @@ impl Bvh {
 
     pub(crate) fn counting<'a>(&self, costs: &'a mut [Cost]) -> Counting<'a> {
         Counting::new(costs, self.tree.top_nodes())
-    }
-
-    pub(super) fn rule(&self) -> &Rule {
-        &self.tree.pick
     }
 
     pub(super) fn depth(&self) -> usize {

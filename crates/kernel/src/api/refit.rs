@@ -15,7 +15,7 @@ impl Bvh {
     /// bit for bit. [`Bvh::quality`] returns what a query in the old nodes costs, relative to the build. A refit is far
     /// cheaper than a build, and shared among the threads of the current rayon pool.
     ///
-    /// A tree of the laboratory's builder `sbvh` has some triangles in several leaves, each with a box around a part
+    /// A builder may leave some triangles in several leaves, each with a box around a part
     /// of it. After a refit each of these boxes is around the whole triangle, so such a tree loses more than others.
     /// Filters of cut-outs stay as they were at the build.
     ///

@@ -15,7 +15,6 @@ use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::trace::surface::{Surface, surface, unit};
 use crate::tree::any::on_tree;
-use crate::tree::rule::Rule;
 
 /// Items of a stack on the program stack: enough for 32 levels of 16 children, 71 of 8 and 167 of 4. Items that a tree
 /// does not need are not written. Deeper trees take their stack from the pool.
@@ -37,7 +36,7 @@ impl Bvh {
     /// ```
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
-        if self.rule() == &Rule::Slots {
+        if self.tree.pick.is_none() {
             return self.one::<Occlusion>(ray);
         }
         let mut answer = [false];

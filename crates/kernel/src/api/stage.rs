@@ -15,6 +15,7 @@ use std::sync::OnceLock;
 
 use super::bvh::Bvh;
 use super::recipe::{Recipe, TrainingRays};
+use super::steps::Steps;
 use super::times::{BuildTimes, Stopwatch};
 use crate::builder;
 use crate::collapse::Learning;
@@ -47,8 +48,8 @@ use crate::tree::binary::BinaryTree;
 /// # Ok::<(), antumbra::Error>(())
 /// ```
 pub struct Stage {
-    primitives: Arc<Primitives>,
-    binary: BinaryStage,
+    pub(super) primitives: Arc<Primitives>,
+    pub(super) binary: BinaryStage,
 }
 
 impl Stage {
@@ -94,29 +95,6 @@ impl Stage {
     }
 }
 
-/// The steps of the laboratory.
-#[cfg(feature = "lab")]
-impl Stage {
-    /// Binary tree of this stage.
-    pub fn tree(&self) -> &BinaryTree {
-        &self.binary.tree
-    }
-
-    /// Log of the training rays of a recipe in the binary tree.
-    pub fn training_log(&self, rays: &[Ray], recipe: &Recipe) -> Cow<'_, TreeLog> {
-        self.binary.training_log(&self.primitives, rays, recipe)
-    }
-
-    /// Wide tree for the rays of a training log, or without one for areas only. A thorough search for a learned
-    /// collapse takes two starts, which pays for rays that are known.
-    ///
-    /// # Panics
-    /// If the log was made for another tree.
-    pub fn collapse_for(&self, log: Option<&TreeLog>, thorough: bool, recipe: &Recipe) -> Bvh {
-        (self.binary).collapse_for(&self.primitives, log, thorough, recipe)
-    }
-}
-
 /// Reports to a monitor how far a build is. [`Error::Cancelled`] if the monitor stops the build.
 pub(super) fn reached(done: f32, monitor: &dyn BuildMonitor) -> Result<(), Error> {
     monitor.progress(done);
@@ -130,7 +108,7 @@ pub(super) fn reached(done: f32, monitor: &dyn BuildMonitor) -> Result<(), Error
 /// A [`Stage`] without its primitives. Every step must be given the primitives of the first.
 #[derive(Debug)]
 pub(crate) struct BinaryStage {
-    tree: BinaryTree,
+    pub(super) tree: BinaryTree,
     time: Duration,
     /// Made on first use and kept.
     surface_log: OnceLock<SurfaceLog>,

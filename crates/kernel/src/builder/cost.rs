@@ -3,7 +3,6 @@
 use alloc::vec::Vec;
 use core::ops::AddAssign;
 
-#[cfg(feature = "lab")]
 use crate::aabb::Aabb;
 use crate::builder::binned_sah::planes::Planes;
 use crate::geometry::BLOCK;
@@ -21,19 +20,21 @@ const TABLE: usize = 256;
 /// as much as a full one. Beyond that the count of blocks is half way between the fraction and the whole number.
 /// `docs/notes/kernel.md` compares these choices.
 #[derive(Clone)]
-pub(crate) struct Cost {
+pub struct Cost {
     table: [f32; TABLE + 1],
 }
 
-impl Cost {
-    pub fn new() -> Self {
+impl Default for Cost {
+    fn default() -> Self {
         let mut table = [0.0; TABLE + 1];
         for (count, weight) in table.iter_mut().enumerate() {
             *weight = Self::weight(count);
         }
         Self { table }
     }
+}
 
+impl Cost {
     fn weight(count: usize) -> f32 {
         let whole = count.div_ceil(BLOCK) * BLOCK;
         let blocks = (count.max(BLOCK) + whole.max(BLOCK)) as f32 / (2 * BLOCK) as f32;
@@ -41,7 +42,6 @@ impl Cost {
     }
 
     /// The estimate for `count` primitives in a box.
-    #[cfg(feature = "lab")]
     pub fn of_box(&self, bounds: &Aabb, count: usize) -> f32 {
         bounds.half_area() * self.weight_of(count)
     }

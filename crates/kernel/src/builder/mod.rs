@@ -20,7 +20,8 @@ use crate::monitor::BuildMonitor;
 use crate::parallel;
 use crate::ray::Ray;
 use crate::tree::binary::BinaryTree;
-use antumbra_simd::named_list;
+use alloc::vec::Vec;
+use antumbra_simd::{Row, named_list};
 
 named_list! {
     /// How the binary tree is built.
@@ -32,38 +33,14 @@ named_list! {
     /// assert_eq!(Builder::default().name(), "reinsertion");
     /// ```
     #[derive(Default)]
-    pub enum Builder("builder"): Properties {
+    pub enum Builder("builder"): Properties, open Grow {
         BinnedSah = "binned-sah",
             "Object splits between bins by the surface area heuristic: the fastest to build",
             Some("Wald 2007"), Properties::PLAIN;
-        Pbrt if "lab" = "pbrt",
-            "Object splits over 12 buckets, leaves of at most 4 and only where cheaper, as in pbrt-v3",
-            Some("Pharr, Jakob and Humphreys 2016"), Properties::PLAIN;
-        Pbrt2015 if "lab" = "pbrt-2015",
-            "As `pbrt`, with one primitive in a leaf, as in pbrt-v3 until November 2015",
-            Some("Pharr, Jakob and Humphreys 2016"), Properties::PLAIN;
         #[default]
         Reinsertion = "reinsertion",
             "Binned SAH, then subtrees moved to better places",
             Some("Bittner, Hapala and Havran 2013"), Properties { reinserts: true, ..Properties::PLAIN };
-        Ploc if "lab" = "ploc",
-            "Neighbours on a space-filling curve merged, the nearest first",
-            Some("Meister and Bittner 2018"), Properties::PLAIN;
-        PlocReinsertion if "lab" = "ploc-reinsertion",
-            "PLOC, then subtrees moved to better places",
-            Some("Meister and Bittner 2018"), Properties { reinserts: true, ..Properties::PLAIN };
-        Sbvh if "lab" = "sbvh",
-            "Spatial splits beside object splits: a primitive may be in several leaves",
-            Some("Stich, Friedrich and Dietrich 2009"), Properties::PLAIN;
-        Rdh if "lab" = "rdh",
-            "Object splits by how many training rays enter the boxes, blended with area",
-            Some("Bittner and Havran 2009"), Properties { needs_rays: true, ..Properties::PLAIN };
-        Srdh if "lab" = "srdh",
-            "Object splits by what training rays cost that stop at their first occluder",
-            Some("Feltman, Lee and Fatahalian 2012"), Properties { needs_rays: true, ..Properties::PLAIN };
-        Vdbvh if "lab" = "vdbvh",
-            "Object splits by how many primitives rays see, blended with area",
-            Some("Vinkler, Havran and Sochor 2012"), Properties { needs_rays: true, ..Properties::PLAIN };
     }
 }
 
@@ -80,26 +57,51 @@ impl Properties {
         needs_rays: false,
         reinserts: false,
     };
+
+    fn of(builder: &dyn Grow) -> Self {
+        Self {
+            needs_rays: builder.needs_rays(),
+            reinserts: builder.reinserts(),
+        }
+    }
 }
 
 impl Builder {
     /// Whether the tree is built for training rays.
-    pub const fn needs_rays(self) -> bool {
+    pub fn needs_rays(self) -> bool {
         self.properties().needs_rays
     }
 }
 
+/// A builder of your own, for [`Builder::Other`].
+///
+/// It makes binary trees over the primitives of the world and of each object. What comes after it is the kernel's:
+/// instances are put into the tree of the world, and the trees become wide.
+pub trait Grow: Row {
+    /// Whether it builds for training rays.
+    fn needs_rays(&self) -> bool {
+        false
+    }
+
+    /// Whether subtrees are moved to better places in the end, as [`Builder::Reinsertion`] does.
+    fn reinserts(&self) -> bool {
+        false
+    }
+
+    /// Builds the tree of the world's own primitives, and behind it the tree of each of [its
+    /// objects](Primitives::object_list). The tree of nothing is [`BinaryTree::default`]. Primitives of one leaf are of
+    /// one kind, and at most [`BLOCK`](crate::parts::BLOCK). Trees are not deep: halve nodes from some depth on.
+    ///
+    /// `rays` serve builders that need rays, all with the same weight. There may be none.
+    fn grow(&self, primitives: &Primitives, rays: &[Ray]) -> Vec<BinaryTree>;
+}
+
 /// Builds a tree over all primitives; empty for none. `rays` serve the builders that [need
-/// rays](Builder::needs_rays), all with the same weight; the others ignore them. Of more than 2¹⁴ rays an even
-/// selection is used. Without rays, and where hardly any come, the result is the tree of [`Builder::BinnedSah`]. An
-/// object is built for the rays that enter its instances.
+/// rays](Builder::needs_rays), all with the same weight; the others ignore them. Without rays, and where hardly any
+/// come, the result is the tree of [`Builder::BinnedSah`]. An object is built for the rays that enter its instances.
 ///
 /// The tree does not depend on the number of threads. If `monitor` stops the build, the tree is sound, but not the one
 /// that was requested.
-#[cfg_attr(
-    not(feature = "lab"),
-    expect(unused_variables, reason = "no builder needs rays")
-)]
 pub(crate) fn build(
     primitives: &Primitives,
     builder: Builder,
@@ -110,29 +112,32 @@ pub(crate) fn build(
         true => reinsertion::improved(&tree, monitor),
         false => tree,
     };
-    #[cfg(feature = "lab")]
-    let training = crate::lab::builders::TrainingHits::new(builder, primitives, rays);
-    let build_one = |primitives: &Primitives, object: Option<usize>| match builder {
-        Builder::BinnedSah | Builder::Reinsertion => improved(binned_sah::build(primitives)),
-        #[cfg(feature = "lab")]
-        builder => improved(training.build(builder, primitives, object)),
+    let grown = match builder {
+        Builder::Other(builder) => builder.grow(primitives, rays),
+        Builder::BinnedSah | Builder::Reinsertion => Vec::new(),
+    };
+    let build_one = |primitives: &Primitives, place: usize| {
+        improved(match grown.get(place) {
+            Some(tree) => tree.clone(),
+            None => binned_sah::build(primitives),
+        })
     };
     if primitives.instances.is_empty() {
         return BinaryTree {
             identity: primitives.identity.clone(),
-            ..build_one(primitives, None)
+            ..build_one(primitives, 0)
         };
     }
     let (mut tree, objects) = parallel::join(
         || {
             improved(two_levels::with_instances(
-                &build_one(primitives, None),
+                &build_one(primitives, 0),
                 primitives,
             ))
         },
         || {
             parallel::map(primitives.objects.len(), 1, |object| {
-                build_one(&primitives.objects[object], Some(object))
+                build_one(&primitives.objects[object], 1 + object)
             })
         },
     );

@@ -9,7 +9,7 @@ use crate::builder::Builder;
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::test_primitives::primitives;
-use crate::lab::sbvh::clip::within;
+use crate::parts::sbvh::clip::within;
 use crate::learn::surface_rays::surface_rays;
 use crate::tree::binary::BinaryKind;
 use crate::tree::binary::BinaryTree;

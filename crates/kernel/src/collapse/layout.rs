@@ -16,7 +16,6 @@ use crate::tree::binary::{BinaryKind, BinaryTree};
 use crate::tree::leaves::{LeafBlocks, first_block};
 use crate::tree::node::{Child, Leaf, Node, NodeMut};
 use crate::tree::nodes::Nodes;
-use crate::tree::rule::Rule;
 use crate::tree::wide::{PlacedTree, Tree};
 use crate::tree::width::Width;
 
@@ -56,7 +55,7 @@ pub(crate) fn lay_out(top: &Part, objects: &[Option<Part>], width: Width) -> Tre
         bounds,
         reach: bounds.reach(),
         depth,
-        pick: Rule::Slots,
+        pick: None,
         motion: None,
     }
 }

@@ -24,7 +24,7 @@ use crate::tree::binary::{BinaryKind, BinaryTree};
 use crate::tree::costs::CostModel;
 use crate::tree::wide::Tree;
 use crate::tree::width::Width;
-use antumbra_simd::named_list;
+use antumbra_simd::{Row, named_list};
 
 /// Weight of the area prior, as a share of the rays in the log: what no ray visited is collapsed by area, and an open
 /// scene does not fit only the sampled rays. Anything from 0.01 to 1 gives the same visits within 1 % on four scenes;
@@ -41,7 +41,7 @@ named_list! {
     /// assert!(Collapse::Learned.needs_log());
     /// ```
     #[derive(Default)]
-    pub enum Collapse("collapse"): Properties {
+    pub enum Collapse("collapse"): Properties, open Contract {
         Area = "area",
             "Children of large area are opened first",
             Some("Wald, Benthin and Boulos 2008"), Properties { needs_log: false };
@@ -52,12 +52,6 @@ named_list! {
         Learned = "learned",
             "The combination that costs training rays least, and leaf splitting",
             None, Properties { needs_log: true };
-        LearnedUnsorted if "lab" = "learned-unsorted",
-            "The nodes of `learned`, whose children stay in the order of the binary tree: for ablations",
-            None, Properties { needs_log: true };
-        Rsc if "lab" = "rsc",
-            "Children that training rays visit most are opened first",
-            Some("Gu, He and Blelloch 2015"), Properties { needs_log: true };
     }
 }
 
@@ -66,20 +60,43 @@ pub(crate) struct Properties {
     needs_log: bool,
 }
 
+impl Properties {
+    fn of(_: &dyn Contract) -> Self {
+        Self { needs_log: true }
+    }
+}
+
 impl Collapse {
     /// Whether it learns from training rays.
-    pub const fn needs_log(self) -> bool {
+    pub fn needs_log(self) -> bool {
         self.properties().needs_log
     }
 
     /// Whether it puts children and primitives in a learned order, if a [`Learning`] wants that.
     pub(crate) fn sorts(self) -> bool {
-        self.name() != "learned-unsorted"
+        match self {
+            Self::Other(other) => other.sorts(),
+            _ => true,
+        }
     }
 }
 
+/// A collapse of your own, for [`Collapse::Other`]. It learns from a training log of the binary tree.
+pub trait Contract: Row {
+    /// Whether children and primitives are put in a learned order, too.
+    fn sorts(&self) -> bool {
+        true
+    }
+
+    /// What decides which binary nodes stay; `None` for the nodes of [`Collapse::Learned`].
+    fn contraction(&self) -> Option<Contractor>;
+}
+
+/// Makes a contraction of a binary tree to nodes of so many children, for training rays that visit each of its inner nodes so
+/// often, were it a node of the wide tree: finite and not negative. Leaves have a number, too, of no meaning.
+pub type Contractor = fn(&BinaryTree, &[f32], usize) -> Box<dyn Contraction>;
+
 /// What a collapse takes from a training log: the nodes that stay, the leaves that are split, and the order of children.
-/// Used by [`Laboratory`](crate::lab::Laboratory).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learning {
     /// Which binary nodes stay.
@@ -178,6 +195,12 @@ fn part<'a>(
     };
     let rays = Rays::new(tree, log, width);
     let sorted = |collapse: &dyn Contraction| Skeleton::sorted(tree, collapse, width, sorting);
+    let whole = |skeleton| Part {
+        primitives,
+        tree: Cow::Borrowed(tree),
+        skeleton,
+        prim_hits: learning.sort.then(|| Cow::Borrowed(log.prim_hits())),
+    };
     let (skeleton, cost) = match learning.collapse {
         Collapse::Area => sorted(&AreaCollapse),
         Collapse::Sah => {
@@ -187,15 +210,15 @@ fn part<'a>(
                 .collect();
             sorted(&CheapestCollapse::new(tree, &areas, width))
         }
-        #[cfg(feature = "lab")]
-        Collapse::Rsc => {
-            use crate::lab::rsc::RscCollapse;
-            let contract = |visits: &[f32]| Box::new(RscCollapse::new(visits)) as Box<_>;
-            let visits = rays.visits(&contract, sorting, false);
-            sorted(&*contract(&visits))
-        }
-        // `learned-unsorted` in the laboratory.
-        _ => {
+        Collapse::Learned | Collapse::Other(_) => {
+            if let Collapse::Other(other) = learning.collapse
+                && let Some(contraction) = other.contraction()
+            {
+                let contract = |visits: &[f32]| contraction(tree, visits, width);
+                let visits = rays.visits(&contract, sorting, false);
+                let (skeleton, cost) = sorted(&*contract(&visits));
+                return (whole(skeleton), cost);
+            }
             let visits = rays.visits(&rays.cheapest(), sorting, learning.thorough);
             // Of a log without rays nothing can be learned that is worth memory.
             if log.weight() > 0.0 {
@@ -204,13 +227,7 @@ fn part<'a>(
             sorted(&CheapestCollapse::new(tree, &visits, width))
         }
     };
-    let part = Part {
-        primitives,
-        tree: Cow::Borrowed(tree),
-        skeleton,
-        prim_hits: learning.sort.then(|| Cow::Borrowed(log.prim_hits())),
-    };
-    (part, cost)
+    (whole(skeleton), cost)
 }
 
 /// The learned collapse for rays that visit nodes so often, leaves being opened where that pays.
@@ -247,9 +264,8 @@ struct Rays<'a> {
     width: usize,
 }
 
-/// The contraction for rays that visit each inner binary node so often, were it a node of the wide tree: finite and not
-/// negative. Leaves have a number, too, of no meaning.
-type Contract<'a> = dyn Fn(&[f32]) -> Box<dyn Contraction> + 'a;
+/// The contraction for rays that visit each binary node so often, see [`Contractor`].
+type ForVisits<'a> = dyn Fn(&[f32]) -> Box<dyn Contraction> + 'a;
 
 impl<'a> Rays<'a> {
     fn new(tree: &'a BinaryTree, log: &'a TreeLog, width: usize) -> Self {
@@ -274,7 +290,7 @@ impl<'a> Rays<'a> {
     /// and keeps the result that costs the rays of the log less: on sponza, 8 wide, that saves up to 18 % of the node
     /// tests, elsewhere nothing to 2 %. Random starts promise more by the model than they keep (up to 4 % more node
     /// tests on sibenik).
-    fn visits(&self, contract: &Contract<'_>, sorting: Sorting, thorough: bool) -> Vec<f32> {
+    fn visits(&self, contract: &ForVisits<'_>, sorting: Sorting, thorough: bool) -> Vec<f32> {
         let from = |start: &[f32]| self.visits_if(contract, sorting, &self.with_prior(start));
         let first = from(&sorting.counts.entered).0;
         if !thorough || self.log.weight() == 0.0 {
@@ -293,7 +309,7 @@ impl<'a> Rays<'a> {
     /// cost there below the root.
     fn visits_if(
         &self,
-        contract: &Contract<'_>,
+        contract: &ForVisits<'_>,
         sorting: Sorting,
         visits: &[f32],
     ) -> (Vec<f32>, f64) {
@@ -356,7 +372,7 @@ mod tests {
     use super::*;
     use crate::builder::Builder;
     use crate::geometry::Geometry;
-    use crate::lab::Laboratory;
+    use crate::parts::Steps;
     use crate::ray::Ray;
     use crate::recipe::Level;
     use crate::trace::observe::Cost;

@@ -18,15 +18,15 @@ use crate::tree::node::{MAX_WIDTH, PerSlot};
 const SEQUENTIAL: usize = 2048;
 
 /// Decides which binary nodes become the children of one wide node.
-pub(crate) trait Contraction: Sync {
+pub trait Contraction: Sync {
     /// The children of the wide node made of binary node `binary`, at most `width`, in depth-first order. Children of an inner
     /// node are at least two nodes below it; a leaf, which only the root can be, is its own child.
     fn children(&self, tree: &BinaryTree, binary: usize, width: usize) -> Children;
 }
 
-/// Up to [`MAX_WIDTH`] binary nodes.
+/// The binary nodes that become the children of one wide node, at most 16.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Children {
+pub struct Children {
     nodes: PerSlot<u32>,
     len: usize,
 }
@@ -39,10 +39,13 @@ impl Children {
         Self { nodes, len: 1 }
     }
 
+    /// How many they are.
+    #[allow(clippy::len_without_is_empty, reason = "never empty")]
     pub fn len(&self) -> usize {
         self.len
     }
 
+    /// The nodes in depth-first order.
     pub fn as_slice(&self) -> &[u32] {
         &self.nodes[..self.len]
     }

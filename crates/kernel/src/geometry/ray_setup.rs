@@ -80,6 +80,7 @@ use core::ops::Deref;
 
 use antumbra_simd::{Lanes, Mask, Scalar, Simd, Width};
 
+use crate::geometry::slab_test::hits_box;
 use crate::aabb::Aabb;
 use crate::geometry::slab_test::{One, value, widened_offsets};
 use crate::geometry::triangle_hit::ShearedRay;
@@ -112,9 +113,8 @@ pub(crate) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// Whether a length is [`SANE`].
-#[cfg(feature = "lab")]
-pub(crate) fn is_sane(length: f32) -> bool {
+/// Whether a length is neither so small nor so large that distances underflow or overflow.
+pub fn is_sane(length: f32) -> bool {
     SANE.0 < length && length < SANE.1
 }
 
@@ -216,30 +216,35 @@ pub(crate) const NEAR: [[Side; 4]; 8] = {
 /// 128 bytes.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(crate) struct RaySetup {
+pub struct RaySetup {
     /// Input of the slab test: the reciprocal direction; `org * rdir`, widened so that near planes come nearer;
     /// the same, widened so that far planes go farther. 0, +∞ and -∞ when culling is off.
-    pub slabs: [[f32; 4]; 3],
+    pub(crate) slabs: [[f32; 4]; 3],
     /// Near plane of each axis. A fourth, so that they are copied as one word.
-    pub near: [Side; 4],
+    pub(crate) near: [Side; 4],
     /// The axes x, y, z of the shear: z is the one of the largest direction component.
-    pub axes: [Axis; 3],
+    pub(crate) axes: [Axis; 3],
     /// Lengths are not [`SANE`], or the interval begins at -∞: everything is in doubt.
-    pub extreme: bool,
+    pub(crate) extreme: bool,
     ray: Ray,
     /// The origin on the axes of the shear.
-    pub shear_org: [f32; 3],
+    pub(crate) shear_org: [f32; 3],
     /// `dir_x / dir_z`, `dir_y / dir_z`, `-1 / dir_z` on those axes.
-    pub shear: [f32; 3],
+    pub(crate) shear: [f32; 3],
     /// `R` as above: the largest coordinate of the origin, by magnitude, plus the scene extent.
     reach: f32,
     /// The instance in whose space this is, or [`INVALID_ID`].
-    pub inst_id: u32,
+    pub(crate) inst_id: u32,
 }
 
 impl RaySetup {
+    /// Whether the ray enters a box, as the test of node boxes has it: it may report a box that the ray barely misses.
+    pub fn hits_box(&self, bounds: &Aabb) -> bool {
+        hits_box(self, bounds)
+    }
+
     /// The set-up of no ray; never traced.
-    pub const IDLE: Self = Self {
+    pub(crate) const IDLE: Self = Self {
         slabs: [[0.0; 4]; 3],
         near: [Side::Low; 4],
         axes: [Axis::X, Axis::Y, Axis::Z],
@@ -258,13 +263,13 @@ impl RaySetup {
 
     /// `R` as above: the largest coordinate of the origin, by magnitude, plus the scene extent.
     #[inline(always)]
-    pub fn reach(&self) -> f32 {
+    pub(crate) fn reach(&self) -> f32 {
         self.reach
     }
 
     /// Makes a ray ready for primitives whose coordinates are at most `extent`; `None` when the ray cannot hit
     /// anything (see [`Ray`]).
-    pub fn new(ray: &Ray, extent: f32) -> Option<Self> {
+    pub(crate) fn new(ray: &Ray, extent: f32) -> Option<Self> {
         let mut setup = Self::IDLE;
         setup.set(Scalar, ray, extent).then_some(setup)
     }
@@ -272,7 +277,7 @@ impl RaySetup {
     /// [`RaySetup::new`] in place, which spares a stream the copy, and with the vectors of a level, which changes
     /// no bit. Returns whether the ray can hit anything; if not, what is in place is not to be traced.
     #[inline(always)]
-    pub fn set<S: Simd>(&mut self, simd: S, ray: &Ray, extent: f32) -> bool {
+    pub(crate) fn set<S: Simd>(&mut self, simd: S, ray: &Ray, extent: f32) -> bool {
         type Vector<S> = <S as Width<4>>::Lanes;
         let [ox, oy, oz] = ray.org;
         let [dx, dy, dz] = ray.dir;
@@ -344,19 +349,19 @@ impl RaySetup {
 
     /// The reciprocal direction on an axis.
     #[inline(always)]
-    pub fn rdir(&self, axis: usize) -> f32 {
+    pub(crate) fn rdir(&self, axis: usize) -> f32 {
         self.slabs[0][axis]
     }
 
     /// Whether the direction is negative on an axis, so that the near plane is the upper one.
     #[inline(always)]
-    pub fn negative(&self, axis: usize) -> bool {
+    pub(crate) fn negative(&self, axis: usize) -> bool {
         self.near[axis] == Side::High
     }
 
     /// The ray on the axes of its shear.
     #[inline(always)]
-    pub fn sheared(&self) -> ShearedRay {
+    pub(crate) fn sheared(&self) -> ShearedRay {
         ShearedRay {
             org: self.shear_org,
             shear: self.shear,
@@ -367,14 +372,14 @@ impl RaySetup {
 
     /// Whether boxes can be missed at all.
     #[inline(always)]
-    pub fn culls(&self) -> bool {
+    pub(crate) fn culls(&self) -> bool {
         self.rdir(0) != 0.0
     }
 
     /// `org * rdir` on three axes, widened for the near and for the far plane of the box of an instance or a sphere; the
     /// fourth lanes have no meaning.
     #[inline(always)]
-    pub fn prim_offsets<S: Simd>(&self, simd: S) -> [<S as Width<4>>::Lanes; 2] {
+    pub(crate) fn prim_offsets<S: Simd>(&self, simd: S) -> [<S as Width<4>>::Lanes; 2] {
         type Vector<S> = <S as Width<4>>::Lanes;
         let [ox, oy, oz] = self.org;
         let org = Vector::<S>::load(simd, &[ox, oy, oz, 0.0]);

@@ -34,7 +34,6 @@ impl LogKind {
     /// Whether a log of this kind holds all that one of the `other` kind would hold of the same rays, so that whatever
     /// learns from that one can learn the same from this one. Rays that visit children in another order hit other
     /// primitives: neither of a shuffled and a straight log covers the other.
-    #[cfg(feature = "lab")]
     pub const fn covers(self, other: Self) -> bool {
         self.shuffled == other.shuffled
             && (self.boxes || !other.boxes)
@@ -43,7 +42,6 @@ impl LogKind {
 
     /// The kinds of which at least one covers each of the kinds given, none of them needlessly: what to log so
     /// that every order has its log.
-    #[cfg(feature = "lab")]
     pub fn covering(kinds: impl IntoIterator<Item = Self>) -> Vec<Self> {
         let mut least: Vec<Self> = Vec::new();
         for kind in kinds {
@@ -112,7 +110,6 @@ impl Log {
     }
 
     /// Logged rays that were occluded.
-    #[cfg(feature = "lab")]
     pub fn occluded(&self) -> u64 {
         self.occluded
     }
@@ -122,7 +119,6 @@ impl Log {
         self.seed
     }
 
-    #[cfg(feature = "lab")]
     /// Adds the counters of another log of the same tree. Counters are whole numbers, so the sum does not depend on how
     /// rays were divided among logs.
     ///

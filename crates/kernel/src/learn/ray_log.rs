@@ -49,7 +49,6 @@ impl RayLog {
     }
 
     /// Adds other rays.
-    #[cfg(feature = "lab")]
     pub fn append(&mut self, other: &Self) {
         let first = self.visits.len();
         let rays = other.rays.iter().map(|ray| LoggedRay {

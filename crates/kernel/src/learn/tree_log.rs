@@ -46,7 +46,7 @@ const BYTES_PER_ITEM: [usize; 2] = [16, 12];
 /// Partly transparent triangles are hit by the rays that they would stop, see [`crate::cutout::Opacity`].
 ///
 /// A log of one kind of rays can ruin the tree for another kind. Unless only one kind will be traced, add
-/// [`crate::lab::surface_rays`] of the same weight as your own: on four scenes that costs your rays 0 to 6 % more
+/// [`crate::parts::surface_rays`] of the same weight as your own: on four scenes that costs your rays 0 to 6 % more
 /// visits and spares the others up to 35 %.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TreeLog {
@@ -161,7 +161,7 @@ impl TreeLog {
         }
     }
 
-    /// What `count` [`surface_rays`](crate::lab::surface_rays) hit, each of weight 1: the default log of a scene whose
+    /// What `count` [`surface_rays`](crate::parts::surface_rays) hit, each of weight 1: the default log of a scene whose
     /// rays are not known yet. `None` is the number that suits its size: their cost stays in proportion to the cost of
     /// the build, and on five scenes 1000 rays give nearly the visits that 4000 do, 256 up to 25 % more.
     pub fn of_surfaces(primitives: &Primitives, tree: &BinaryTree, count: Option<usize>) -> Self {
@@ -266,7 +266,6 @@ impl TreeLog {
     }
 
     /// Rays logged so far, without those that cannot hit anything.
-    #[cfg(feature = "lab")]
     pub fn rays(&self) -> usize {
         self.weights.len()
     }

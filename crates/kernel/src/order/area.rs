@@ -9,7 +9,7 @@ use crate::tree::wide::Tree;
 
 /// Larger boxes first.
 pub(crate) fn plan(tree: &Tree) -> SlotOrder {
-    let mut order = SlotOrder::as_built(tree.shape());
+    let mut order = SlotOrder::of_nothing(tree);
     for node in tree.nodes.iter() {
         order.push(&sorted_slots(node, &[0.0; MAX_WIDTH]));
     }

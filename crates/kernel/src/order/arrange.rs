@@ -12,7 +12,7 @@ use alloc::vec::Vec;
 pub(crate) const EXACT: usize = 8;
 
 /// Costs of things. Things are numbered from 0; a set has a bit for each.
-pub(crate) trait Costs {
+pub trait Costs {
     /// The cost of a thing when the things of the set come before it.
     fn cost(&self, thing: usize, before: u32) -> f64;
 
@@ -22,7 +22,7 @@ pub(crate) trait Costs {
 
 /// The cheapest order of `len` things that is found. Where it does not matter, they are sorted by their numbers; they
 /// are best numbered by some good order already.
-pub(crate) fn arrange(len: usize, costs: &impl Costs) -> Vec<usize> {
+pub fn arrange(len: usize, costs: &impl Costs) -> Vec<usize> {
     if len <= EXACT {
         return exact(len, costs);
     }

@@ -7,7 +7,7 @@
 //! - learned from a training log: `ratio`: the paper's rule and its cost model;  `joint`: least measured cost
 //! - `arrange`: the cheapest order of a few things
 //!
-//! Rows that the table has only with the feature `lab` are planned in [`crate::lab`].
+//! Other orders plug in through [`Plan`].
 
 pub(crate) mod area;
 pub(crate) mod arrange;
@@ -23,7 +23,7 @@ use crate::tree::costs::CostModel;
 use crate::tree::node::{NodeRef, PerSlot};
 use crate::tree::slot_order::SlotOrder;
 use crate::tree::wide::Tree;
-use antumbra_simd::named_list;
+use antumbra_simd::{Row, named_list};
 
 use ratio::Estimate;
 
@@ -37,25 +37,16 @@ named_list! {
     /// assert_eq!(Order::default(), Order::Joint);
     /// ```
     #[derive(Default)]
-    pub enum Order("order"): Properties {
+    pub enum Order("order"): Properties, open Plan {
         Simple = "simple",
             "Children stay as the collapse left them",
             None, Properties::WITHOUT_LOG;
-        Random if "lab" = "random",
-            "A random permutation for each node: what the others have to beat",
-            None, Properties::WITHOUT_LOG;
-        Ftob if "lab" = "ftob",
-            "Front to back by entry distance, decided for every ray",
-            None, Properties { picks_by_ray: true, ..Properties::WITHOUT_LOG };
         Sato = "sato",
             "Larger surface area first",
             Some("Nah and Manocha 2014"), Properties::WITHOUT_LOG;
         Embree = "embree",
             "Fewer primitives first, as Embree's static order has it",
             None, Properties::WITHOUT_LOG;
-        Rtsah if "lab" = "rtsah",
-            "Least cost for uniform rays",
-            Some("Ize and Hansen 2011"), Properties::WITHOUT_LOG;
         SortMinus = "sort-",
             "Learned from leaf hits alone (equation 4)",
             Some("Ogaki and Derouet-Jourdan 2016"), Properties::learns(LogKind { boxes: false, shuffled: false, masks: false });
@@ -84,12 +75,13 @@ const MASKS: LogKind = LogKind {
 
 /// Columns of the table of orders.
 pub(crate) struct Properties {
+    /// The kind of log that it learns from.
     pub log: Option<LogKind>,
     picks_by_ray: bool,
 }
 
 impl Properties {
-    /// Learns nothing, and is the same for every ray.
+    /// Needs no rays.
     const WITHOUT_LOG: Self = Self {
         log: None,
         picks_by_ray: false,
@@ -102,25 +94,96 @@ impl Properties {
             picks_by_ray: false,
         }
     }
+
+    fn of(plan: &dyn Plan) -> Self {
+        Self {
+            log: plan.log(),
+            picks_by_ray: plan.picks_by_ray(),
+        }
+    }
 }
 
 impl Order {
     /// Kind of log it learns from; `None` if it needs none. A log of a kind that
     /// [covers](LogKind::covers) this one does as well.
-    #[cfg(feature = "lab")]
-    pub const fn log_kind(self) -> Option<LogKind> {
+    pub fn log_kind(self) -> Option<LogKind> {
         self.properties().log
     }
 
     /// Whether it learns from training rays.
-    pub const fn learns(self) -> bool {
+    pub fn learns(self) -> bool {
         self.properties().log.is_some()
     }
 
     /// Whether the sequence depends on the ray, of which the paper's cost model knows nothing.
-    pub const fn picks_by_ray(self) -> bool {
+    pub fn picks_by_ray(self) -> bool {
         self.properties().picks_by_ray
     }
+}
+
+/// A child order of your own, for [`Order::Other`].
+///
+/// An order is a permutation of the slots of every node, or a look at the ray in every node. It changes the cost of
+/// occlusion queries and never an answer.
+///
+/// ```
+/// use antumbra::parts::{Log, Plan, Row, SlotOrder, Tree};
+/// use antumbra::recipe::{CostModel, Order};
+/// use antumbra::{Bvh, Error, Geometry, Recipe};
+///
+/// /// Children in the reverse of the order in which the collapse left them.
+/// struct Reverse;
+///
+/// impl Row for Reverse {
+///     fn name(&self) -> &'static str { "reverse" }
+///     fn sentence(&self) -> &'static str { "The last child first" }
+///     fn source(&self) -> Option<&'static str> { None }
+/// }
+///
+/// impl Plan for Reverse {
+///     fn plan(&self, tree: &Tree, _: Option<&Log>, _: &CostModel) -> Result<SlotOrder, Error> {
+///         let mut order = SlotOrder::of_nodes(tree);
+///         for index in 0..tree.node_count() {
+///             let len = tree.node(index).len();
+///             order.arrange(index, |slot| if slot < len { len - 1 - slot } else { slot });
+///         }
+///         Ok(order)
+///     }
+/// }
+///
+/// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+/// let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// let bvh = Bvh::build(&geometry, &Recipe::default().order(Order::Other(&Reverse)))?;
+/// # bvh.validate().unwrap();
+/// # Ok::<(), antumbra::Error>(())
+/// ```
+pub trait Plan: Row {
+    /// The kind of log that it learns from; `None`, as here, if it needs no rays.
+    fn log(&self) -> Option<LogKind> {
+        None
+    }
+
+    /// Computes the order of a tree whose slots are as its collapse left them. There is a log, of the kind requested, if it
+    /// learns from one and there were rays.
+    ///
+    /// # Errors
+    /// What the log lacks.
+    fn plan(
+        &self,
+        tree: &Tree,
+        log: Option<&Log>,
+        costs: &CostModel,
+    ) -> Result<SlotOrder, Error>;
+
+    /// Whether [`Plan::sort_for_ray`] is called in every node. Occlusion queries then go ray by ray, and trees are saved
+    /// without it.
+    fn picks_by_ray(&self) -> bool {
+        false
+    }
+
+    /// Sorts the lanes of a node that a ray hits so that the one to be visited first comes last. They ascend, that is, slots
+    /// descend. `entered` has the distance at which the box of each lane of the node is entered.
+    fn sort_for_ray(&self, _entered: &[f32], _lanes: &mut [u32]) {}
 }
 
 /// Computes an order for a tree whose slots are as its builder left them.
@@ -140,15 +203,17 @@ pub(crate) fn plan(
         }
     };
     match order {
-        Order::Simple => Ok(SlotOrder::as_built(tree.shape())),
+        Order::Simple => Ok(SlotOrder::of_nothing(tree)),
         Order::Sato => Ok(area::plan(tree)),
         Order::Embree => Ok(size::plan(tree)),
         Order::SortMinus => ratio::plan(tree, needed()?, model, Estimate::Poor),
         Order::Sort | Order::SortPlus => ratio::plan(tree, with_boxes()?, model, Estimate::Precise),
         Order::Visits => ratio::plan(tree, with_boxes()?, model, Estimate::Visited),
         Order::Joint => joint::plan(tree, needed()?, model),
-        #[cfg(feature = "lab")]
-        order => Ok(crate::lab::orders::plan(tree, order, model)),
+        Order::Other(other) => other.plan(tree, log, model).map(|planned| SlotOrder {
+            pick: other.picks_by_ray().then_some(other),
+            ..planned
+        }),
     }
 }
 

@@ -67,7 +67,7 @@ impl Estimate {
 
 /// Chances and cost of one child.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct ChildCost {
+pub struct ChildCost {
     /// `I`: chance that a ray in the node hits the child's box.
     pub enter: f64,
     /// `H`: chance that a ray in the node hits a primitive below the child.
@@ -103,7 +103,7 @@ impl ChildCost {
 }
 
 /// Equation (1) for children in visiting order.
-pub(crate) fn cost_any(node: f64, children: impl IntoIterator<Item = ChildCost>) -> f64 {
+pub fn cost_any(node: f64, children: impl IntoIterator<Item = ChildCost>) -> f64 {
     let mut cost = node;
     let mut unoccluded = 1.0;
     for child in children {
@@ -121,7 +121,7 @@ pub(crate) fn plan(
     estimate: Estimate,
 ) -> Result<SlotOrder, Error> {
     Error::unless_fits(log.shape(), tree.shape())?;
-    let mut planned = SlotOrder::of_nodes(tree.shape());
+    let mut planned = SlotOrder::of_nodes(tree);
     walk(tree, log, model, estimate, |index, node, children| {
         let order = sorted_slots(node, &children.map(|child| child.key()));
         planned.set(index, &order);
@@ -275,7 +275,7 @@ fn chances(
 }
 
 /// Areas of children relative to their parent's.
-pub(crate) fn area_shares<const N: usize>(areas: &[f32; N], parent: f32) -> [f64; N] {
+pub fn area_shares<const N: usize>(areas: &[f32; N], parent: f32) -> [f64; N] {
     areas.map(|area| {
         let share = f64::from(area) / f64::from(parent);
         // 0 / 0 for flat nodes without area, ∞ / ∞ for overflowing ones: no preference.

@@ -12,7 +12,7 @@ use crate::tree::wide::Tree;
 /// Subtrees with fewer primitives first.
 pub(crate) fn plan(tree: &Tree) -> SlotOrder {
     let mut counts = vec![0usize; tree.nodes.len()];
-    let mut order = SlotOrder::of_nodes(tree.shape());
+    let mut order = SlotOrder::of_nodes(tree);
     // Children follow their parents, so going backwards visits them first.
     for (index, node) in tree.nodes.iter().enumerate().rev() {
         let mut key = [0.0; MAX_WIDTH];

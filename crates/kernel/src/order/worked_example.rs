@@ -12,7 +12,7 @@ use crate::tree::wide::Tree;
 
 /// Flat boxes first: children sorted by how much thinner they are than wide.
 fn plan(tree: &Tree) -> SlotOrder {
-    let mut order = SlotOrder::as_built(tree.shape());
+    let mut order = SlotOrder::of_nothing(tree);
     for node in tree.nodes.iter() {
         let mut flatness = [0.0; MAX_WIDTH];
         for (slot, key) in flatness.iter_mut().enumerate().take(node.len()) {

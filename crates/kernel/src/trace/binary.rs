@@ -6,19 +6,19 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use antumbra_simd::{Simd, Width, WithSimd};
+use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
 
-use crate::geometry::BLOCK;
 use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::primitives::{PrimKind, Primitives};
 use crate::geometry::ray_setup::RaySetup;
 use crate::geometry::slab_test::hits_box;
 use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::{BLOCK, QueryKind};
 use crate::ray::Ray;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 
 /// Receives the nodes and hits of rays in one tree, the tree of the world or of an object, one ray after the other.
-pub(crate) trait Witness {
+pub trait Witness {
     /// A ray, made ready for this tree, begins. Returns whether it is to be followed.
     fn begin(&mut self, ray: &RaySetup) -> bool;
 
@@ -35,14 +35,29 @@ pub(crate) trait Witness {
 
 /// The hits of a ray in a leaf.
 #[derive(Clone, Copy)]
-pub(crate) struct LeafHits<'a> {
-    #[cfg(feature = "lab")]
-    pub primitives: &'a Primitives,
+pub struct LeafHits<'a> {
+    primitives: &'a Primitives,
     /// All primitives of the leaf, or its instance.
-    pub prims: &'a [u32],
+    prims: &'a [u32],
     /// Index of the first of `prims` in [`BinaryTree::prims`].
-    pub first: u32,
+    pub(crate) first: u32,
     lanes: u32,
+}
+
+impl LeafHits<'_> {
+    /// The primitives that are hit, with their distances. An instance is left out: what is hit in it is reported to the
+    /// witness of its object.
+    pub fn prims(self, ray: &RaySetup) -> impl Iterator<Item = (u32, f32)> {
+        let (primitives, prims) = (self.primitives, self.prims);
+        self.filter_map(move |lane| {
+            let prim = prims[lane] as usize;
+            if primitives.instance(prim).is_some() {
+                return None;
+            }
+            let hit = primitives.hit(prim, ray, QueryKind::Occluded)?;
+            Some((prim as u32, hit.t))
+        })
+    }
 }
 
 impl Iterator for LeafHits<'_> {
@@ -54,6 +69,27 @@ impl Iterator for LeafHits<'_> {
         let lane = self.lanes.trailing_zeros() as usize;
         self.lanes &= self.lanes.wrapping_sub(1);
         (lane < self.prims.len()).then_some(lane)
+    }
+}
+
+/// Follows rays through a binary tree over `primitives` to their ends, whatever they hit on the way: `world` receives what
+/// happens in the tree of the world, `objects` what happens in the tree of each object, where a ray is one ray for each
+/// instance that it enters. Rays that cannot hit anything are left out, and a tree over nothing reports nothing.
+pub fn follow<W: Witness>(
+    primitives: &Primitives,
+    tree: &BinaryTree,
+    rays: &[Ray],
+    world: &mut W,
+    objects: &mut [W],
+) {
+    if !tree.nodes.is_empty() {
+        Isa::best().dispatch(Exhaustive {
+            primitives,
+            tree,
+            rays,
+            world,
+            objects,
+        });
     }
 }
 
@@ -203,7 +239,6 @@ impl<'a, W: Witness> Follower<'a, W> {
                         any = true;
                         let prims = &tree.prims[first as usize..][..count as usize];
                         let hits = LeafHits {
-                            #[cfg(feature = "lab")]
                             primitives,
                             prims,
                             first,

@@ -91,7 +91,6 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
                     from,
                     lanes: mask.bits(),
                     width: N,
-                    ray,
                 });
                 let hit = (mask, entry);
                 let (lanes, count) = pick.lanes::<N, NodeLanes<S, N>>(bvh, hit);

@@ -4,8 +4,8 @@
 
 use crate::ray::Ray;
 
-/// Receives what happens to occlusion rays in [`crate::trace::instrumented`]. A method does nothing unless overridden.
-pub(crate) trait Observer {
+/// Receives what happens to occlusion rays in [`observe`](crate::parts::observe). A method does nothing unless overridden.
+pub trait Observer {
     /// Ray `index` of the batch begins.
     fn begin(&mut self, _index: usize, _ray: &Ray) {}
 
@@ -37,7 +37,7 @@ pub(crate) trait Observer {
 }
 
 /// A ray at a node.
-pub(crate) struct NodeVisit {
+pub struct NodeVisit {
     /// Index of the node in the tree.
     pub node: usize,
     /// Slot from which the ray comes; for the root of an object, the slot of the instance.
@@ -50,7 +50,7 @@ pub(crate) struct NodeVisit {
 
 /// A slot of a node that the ray has visited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
+pub struct Place {
     /// The number that [`Observer::node`] gave the visit.
     pub visit: u32,
     /// The slot in that node.
@@ -66,10 +66,8 @@ impl Place {
 }
 
 /// Observer that ignores everything.
-#[cfg(feature = "lab")]
 pub(crate) struct Nothing;
 
-#[cfg(feature = "lab")]
 impl Observer for Nothing {}
 
 /// The work done for one ray.

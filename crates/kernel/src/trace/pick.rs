@@ -9,8 +9,6 @@ use crate::hash;
 use crate::ray::Ray;
 use crate::trace::stack::{Item, Stack};
 use crate::tree::node::{Child, Node};
-#[cfg(feature = "lab")]
-use crate::tree::rule::Rule;
 use crate::tree::wide::WideTree;
 
 /// Items of a stack know the order of the children that are pushed.
@@ -122,9 +120,9 @@ impl Children for u64 {
 
 /// Chooses among the hit children of a node.
 pub(crate) enum Pick {
-    /// Ascending slots, whatever the rule of the tree.
+    /// Ascending slots, whatever the order of the tree.
     Slots,
-    /// By the rule of the tree.
+    /// As the order of the tree has it.
     Rule,
     /// At random.
     Shuffled(Shuffle),
@@ -142,24 +140,22 @@ impl Pick {
     /// The lanes of node `index` that `ray` hit, the one to be visited first at the end, and how many they are. `mask`
     /// are these lanes, `entry` the distances at which their boxes are entered.
     #[inline(always)]
-    #[cfg_attr(
-        not(feature = "lab"),
-        expect(unused_variables, reason = "slots need no look at the ray")
-    )]
     pub fn lanes<const N: usize, L: Lanes<N>>(
         &mut self,
         bvh: &WideTree<N>,
         (mask, entry): (L::Mask, L),
     ) -> ([u32; N], usize) {
-        #[cfg(feature = "lab")]
-        if let (Self::Rule, Rule::ByRay(rule)) = (&self, &bvh.pick) {
-            return rule.lanes(mask, entry);
-        }
         let all: [u32; N] = core::array::from_fn(|lane| lane as u32);
         let mut lanes = [0; N];
         let count = mask.compress(&all, &mut lanes);
-        if let Self::Shuffled(shuffle) = self {
-            shuffle.shuffle(&mut lanes[..count]);
+        match (self, bvh.pick) {
+            (Self::Shuffled(shuffle), _) => shuffle.shuffle(&mut lanes[..count]),
+            (Self::Rule, Some(plan)) => {
+                let mut entered = [0.0; N];
+                entry.store(&mut entered);
+                plan.sort_for_ray(&entered, &mut lanes[..count]);
+            }
+            _ => {}
         }
         (lanes, count)
     }

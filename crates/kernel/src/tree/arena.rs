@@ -31,7 +31,7 @@ use crate::geometry::triangle::TriangleBlock;
 /// A wide tree with trees in it that were built before.
 impl Tree {
     /// A tree over nothing with memory for all of these, which have its width.
-    pub fn with_room_for(width: Width, trees: &[&Self]) -> Self {
+    pub(crate) fn with_room_for(width: Width, trees: &[&Self]) -> Self {
         let sum =
             |count: fn(&Self) -> usize| -> usize { trees.iter().map(|tree| count(tree)).sum() };
         let nodes = Nodes::with_capacity(width, 1 + sum(|tree| tree.nodes.len()));
@@ -51,7 +51,7 @@ impl Tree {
     ///
     /// # Errors
     /// Another width; more nodes or leaves than references can name. Nothing has changed then.
-    pub fn join(&mut self, tree: &Self, object: Option<u32>) -> Result<TreePlaces, Error> {
+    pub(crate) fn join(&mut self, tree: &Self, object: Option<u32>) -> Result<TreePlaces, Error> {
         if self.width() != tree.width() {
             return Err(Error::OtherWidth {
                 expected: self.width().lanes(),
@@ -122,7 +122,7 @@ impl Tree {
 
     /// Moves all nodes from `first` on back by so many places, and puts empty ones in between. References from nodes
     /// before `first` stay as they are.
-    pub fn make_room(&mut self, first: usize, by: usize) {
+    pub(crate) fn make_room(&mut self, first: usize, by: usize) {
         self.nodes.make_room(first, by);
         for index in first + by..self.nodes.len() {
             self.nodes
@@ -139,7 +139,7 @@ impl Tree {
 
     /// Writes the top level: its nodes, of which there were `before` and for which there is room, and what its instances
     /// refer to.
-    pub fn set_top(
+    pub(crate) fn set_top(
         &mut self,
         nodes: &Nodes,
         before: usize,
@@ -156,7 +156,7 @@ impl Tree {
     }
 
     /// The boxes around all primitives of a tree at these places.
-    pub fn prim_bounds(&self, places: &TreePlaces) -> impl Iterator<Item = Aabb> {
+    pub(crate) fn prim_bounds(&self, places: &TreePlaces) -> impl Iterator<Item = Aabb> {
         macro_rules! chain {
             ($(($Kind:ident, $list:ident, $Type:ty, $first:literal))*) => {
                 core::iter::empty()$(.chain(prim_bounds(

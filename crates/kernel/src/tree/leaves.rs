@@ -111,13 +111,13 @@ pub(crate) struct LeafPrim {
 impl Tree {
     /// Number of a leaf among the leaves of all kinds: triangle blocks first, the empty one included.
     #[inline(always)]
-    pub fn leaf_index(&self, leaf: Leaf) -> usize {
+    pub(crate) fn leaf_index(&self, leaf: Leaf) -> usize {
         let before = &self.blocks.lens()[..leaf.kind as usize];
         before.iter().sum::<usize>() + leaf.index
     }
 
     /// Number of leaves of all kinds, the empty triangle block included.
-    pub fn leaf_count(&self) -> usize {
+    pub(crate) fn leaf_count(&self) -> usize {
         self.blocks.lens().iter().sum()
     }
 
@@ -127,7 +127,7 @@ impl Tree {
     }
 
     /// Names and bounds of the primitives in a leaf.
-    pub fn leaf_prims(&self, leaf: Leaf) -> Vec<LeafPrim> {
+    pub(crate) fn leaf_prims(&self, leaf: Leaf) -> Vec<LeafPrim> {
         on_leaf!(self, leaf, block => prims_of(block))
     }
 

@@ -8,7 +8,7 @@
 //! - `width`: how many children a node has;  `any`: the switch between widths
 //! - `motion`: what moves between two keys
 //! - `saved`: trees as words;  `words`: the files that these words make
-//! - `slot_order`: a permutation of the slots of a tree;  `rule`: how queries pick
+//! - `slot_order`: a permutation of the slots of a tree
 
 pub(crate) mod any;
 pub(crate) mod arena;
@@ -19,7 +19,6 @@ pub(crate) mod motion;
 pub(crate) mod node;
 pub(crate) mod nodes;
 pub(crate) mod refit;
-pub(crate) mod rule;
 pub(crate) mod saved;
 pub(crate) mod slot_order;
 mod statistics;

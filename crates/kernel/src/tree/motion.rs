@@ -102,7 +102,7 @@ impl Tree {
     ///
     /// # Errors
     /// [`Error::PrimitiveIsGone`] for a triangle that is elsewhere in the middle: the tree is of another scene.
-    pub fn set_motion(&mut self, keys: &impl Keys) -> Result<(), Error> {
+    pub(crate) fn set_motion(&mut self, keys: &impl Keys) -> Result<(), Error> {
         let top = self.top_nodes();
         let mut motion = Motion {
             nodes: Nodes::with_capacity(self.width(), top),
@@ -173,7 +173,7 @@ impl Tree {
     }
 
     /// Checks that the boxes of the world hold what is below them at both keys.
-    pub fn check_motion(&self) -> Result<(), String> {
+    pub(crate) fn check_motion(&self) -> Result<(), String> {
         let Some(motion) = self.motion.as_deref() else {
             return Err("a tree without motion".into());
         };

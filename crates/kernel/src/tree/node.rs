@@ -25,10 +25,10 @@ use crate::geometry::primitives::kinds::for_each_scalar_kind;
 use crate::geometry::primitives::{MAX_INSTANCES, PrimKind};
 
 /// Slots of the widest nodes.
-pub(crate) const MAX_WIDTH: usize = 16;
+pub const MAX_WIDTH: usize = 16;
 
 /// Something for each slot of a node. Those beyond its width are of no meaning.
-pub(crate) type PerSlot<T> = [T; MAX_WIDTH];
+pub type PerSlot<T> = [T; MAX_WIDTH];
 
 /// Two values of the range of instances mean [`Child::EXIT`] and [`Child::DONE`].
 const _: () = assert!(Child::INSTANCE as usize + MAX_INSTANCES == Child::EXIT.0 as usize);
@@ -54,11 +54,12 @@ const _: () = assert!(Child::INSTANCE as usize + MAX_INSTANCES == Child::EXIT.0 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Child(pub u32);
 
-/// A decoded reference.
+/// What is in a slot of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ChildKind {
+pub enum ChildKind {
     /// Index of a node.
     Inner(usize),
+    /// A leaf.
     Leaf(Leaf),
     /// Index of an instance; below it is the tree of its object.
     Instance(usize),
@@ -66,9 +67,9 @@ pub(crate) enum ChildKind {
 
 /// A leaf: the kind of all its primitives, and the index of its block among the blocks of the kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Leaf {
-    pub kind: PrimKind,
-    pub index: usize,
+pub struct Leaf {
+    pub(crate) kind: PrimKind,
+    pub(crate) index: usize,
 }
 
 /// The leaf of the kind in whose range a reference is. Those in free ranges occur in no tree.
@@ -213,7 +214,7 @@ impl<const N: usize> Node<N> {
 
 /// A node of any width, for code that is compiled once: whatever makes, changes or checks trees. Queries take [`Node`]s.
 #[derive(Clone, Copy)]
-pub(crate) struct NodeRef<'a> {
+pub struct NodeRef<'a> {
     /// `[axis][side][lane]`, as in a [`Node`].
     planes: &'a [f32],
     /// [`Child`] per lane.
@@ -227,20 +228,22 @@ impl NodeRef<'_> {
     }
 
     /// How many slots are occupied; they come first.
+    #[allow(clippy::len_without_is_empty, reason = "only the root of an empty tree is empty")]
     pub fn len(&self) -> usize {
         let occupied = |child: &&u32| **child != Child::EMPTY.0;
         self.children.iter().rev().take_while(occupied).count()
     }
 
     /// The lane that holds a slot.
-    pub fn lane(&self, slot: usize) -> usize {
+    pub(crate) fn lane(&self, slot: usize) -> usize {
         self.width() - 1 - slot
     }
 
-    pub fn child(&self, slot: usize) -> Child {
+    pub(crate) fn child(&self, slot: usize) -> Child {
         Child(self.children[self.lane(slot)])
     }
 
+    /// The box of a slot; inside out where the slot is empty.
     pub fn bounds(&self, slot: usize) -> Aabb {
         let width = self.width();
         let plane =
@@ -251,8 +254,13 @@ impl NodeRef<'_> {
         }
     }
 
+    /// What is in an occupied slot.
+    pub fn kind(&self, slot: usize) -> ChildKind {
+        self.child(slot).kind()
+    }
+
     /// The occupied slots with their boxes.
-    pub fn children(self) -> impl Iterator<Item = (Child, Aabb)> {
+    pub(crate) fn children(self) -> impl Iterator<Item = (Child, Aabb)> {
         (0..self.len()).map(move |slot| (self.child(slot), self.bounds(slot)))
     }
 

@@ -44,7 +44,7 @@ impl TreePlaces {
 
 impl Tree {
     /// Places of everything, but for the block that empty slots refer to.
-    pub fn all_places(&self) -> TreePlaces {
+    pub(crate) fn all_places(&self) -> TreePlaces {
         let lens = self.blocks.lens();
         TreePlaces {
             nodes: 0..self.nodes.len(),
@@ -53,7 +53,7 @@ impl Tree {
     }
 
     /// Fails unless every primitive of a tree is still there and sound.
-    pub fn check_moved(&self, places: &TreePlaces, moved: &Moved<'_>) -> Result<(), Error> {
+    pub(crate) fn check_moved(&self, places: &TreePlaces, moved: &Moved<'_>) -> Result<(), Error> {
         let mut ranges = places.blocks.iter();
         on_each_kind!(self, blocks => if let Some(range) = ranges.next() {
             moved.check(&blocks[range.clone()])?;
@@ -63,7 +63,7 @@ impl Tree {
 
     /// Refits trees at these places, which do not overlap and ascend. What moved has been checked. The bounds of the
     /// whole are left to the caller.
-    pub fn refit(&mut self, trees: &[(TreePlaces, Moved<'_>)]) {
+    pub(crate) fn refit(&mut self, trees: &[(TreePlaces, Moved<'_>)]) {
         let mut leaves: Vec<_> = trees
             .iter()
             .map(|(places, _)| LeafBounds::new(places))
@@ -78,7 +78,7 @@ impl Tree {
     }
 
     /// Cost of a random line through the box of a tree at these places, which has no instances.
-    pub fn sah_at(&self, places: &TreePlaces) -> f64 {
+    pub(crate) fn sah_at(&self, places: &TreePlaces) -> f64 {
         let bounds = self.nodes.get(places.nodes.start).all_bounds();
         self.sah_of(places.nodes.clone(), &bounds, &CostModel::default(), &[])
     }

@@ -12,7 +12,6 @@ use alloc::vec::Vec;
 use super::leaves::LeafBlocks;
 use super::node::{Child, ChildKind, Leaf, Node, NodeMut};
 use super::nodes::Nodes;
-use super::rule::Rule;
 use super::validate::{LeafBoxes, Walked, block_box};
 use super::wide::{PlacedTree, Tree};
 use super::width::Width;
@@ -40,13 +39,13 @@ const NO_SHAPE: u32 = u32::MAX;
 
 impl Tree {
     /// Bytes of memory that a file of the tree takes, at most, without the bytes of shapes and filters.
-    pub fn file_bytes(&self) -> usize {
+    pub(crate) fn file_bytes(&self) -> usize {
         self.nodes.len() * 28 * self.width().lanes() / 2
             + self.blocks.triangles.len() * (4 + 44 * BLOCK)
     }
 
     /// Writes everything but functions.
-    pub fn write(&self, sink: &mut Sink<'_>) {
+    pub(crate) fn write(&self, sink: &mut Sink<'_>) {
         write_box(sink, &self.bounds);
         sink.floats([self.reach]);
         sink.word(self.roots.len() as u32);
@@ -93,11 +92,12 @@ impl Tree {
                 sink.floats(row);
             }
         }
-        self.pick.write(sink);
+        // Once the number of a rule of picking: orders that look at the ray are not saved.
+        sink.word(0);
     }
 
     /// A tree as [`Tree::write`] wrote it, with these functions, and what was found when it was checked.
-    pub fn read(
+    pub(crate) fn read(
         words: &mut Words<'_>,
         width: Width,
         functions: &Functions,
@@ -121,10 +121,12 @@ impl Tree {
             bounds,
             reach,
             depth: 0,
-            pick: Rule::Slots,
+            pick: None,
             motion: None,
         };
-        tree.pick = Rule::read(words)?;
+        if words.word()? != 0 {
+            return Err(words.error("its order looks at the ray"));
+        }
         let walked = tree.walk(&boxes).map_err(|broken| words.error(broken))?;
         tree.depth = walked.levels(0);
         Ok((tree, walked))

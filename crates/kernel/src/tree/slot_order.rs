@@ -4,8 +4,9 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::node::PerSlot;
-use super::rule::Rule;
+use super::wide::Tree;
 use crate::geometry::BLOCK;
+use crate::order::{AS_THEY_ARE, Plan};
 use crate::shape::Shape;
 
 /// A permutation of the slots of every node, and of the primitives of every leaf.
@@ -19,27 +20,53 @@ pub struct SlotOrder {
     pub(crate) slots: Vec<u8>,
     /// Per leaf: which lane moves to this place. Empty: leave the leaves as they are.
     pub(crate) lanes: Vec<[u8; BLOCK]>,
-    /// How queries pick; by slot, as a rule.
-    pub(crate) pick: Rule,
+    /// The order itself, if it looks at the ray in every node.
+    pub(crate) pick: Option<&'static dyn Plan>,
 }
 
 impl SlotOrder {
+    /// Leaves a tree as it is.
+    pub fn of_nothing(tree: &Tree) -> Self {
+        Self::as_built(tree.shape())
+    }
+
     /// Leaves everything as it is.
     pub(crate) fn as_built(shape: Shape) -> Self {
         Self {
             shape,
             slots: Vec::new(),
             lanes: Vec::new(),
-            pick: Rule::Slots,
+            pick: None,
         }
     }
 
     /// Leaves the leaves as they are; a place for every slot, to be [set](Self::set) for all nodes.
-    pub(crate) fn of_nodes(shape: Shape) -> Self {
+    pub fn of_nodes(tree: &Tree) -> Self {
+        let shape = tree.shape();
         Self {
             slots: vec![0; shape.nodes * shape.width],
             ..Self::as_built(shape)
         }
+    }
+
+    /// Sets the order of a node: `from` says which slot moves to each place. Empty slots stay behind the others.
+    ///
+    /// # Panics
+    /// If there is no such node, or it is not a permutation of the slots.
+    pub fn arrange(&mut self, node: usize, from: impl Fn(usize) -> usize) {
+        let mut slots = AS_THEY_ARE;
+        let mut found = 0_u32;
+        for (place, slot) in slots.iter_mut().enumerate().take(self.shape.width) {
+            *slot = from(place) as u8;
+            found |= 1_u32.checked_shl(u32::from(*slot)).unwrap_or(0);
+        }
+        assert_eq!(found, (1 << self.shape.width) - 1, "a permutation of the slots");
+        self.set(node, &slots);
+    }
+
+    /// Which slot moves to each place of a node. Empty if the nodes stay as they are.
+    pub fn node(&self, node: usize) -> &[u8] {
+        self.slots.chunks(self.shape.width).nth(node).unwrap_or(&[])
     }
 
     /// Sets the order of a node.

@@ -9,17 +9,16 @@ use crate::aabb::Aabb;
 use crate::tree::costs::CostModel;
 
 impl Tree {
-    /// Bytes of nodes, leaf blocks, instances, opacity micromaps, and orders that are looked up.
-    pub fn bytes(&self) -> usize {
+    /// Bytes of nodes, leaf blocks, instances and opacity micromaps.
+    pub(crate) fn bytes(&self) -> usize {
         self.nodes.bytes()
             + self.leaf_bytes()
             + size_of_val(&self.instances[..])
             + self.filters.bytes()
-            + self.pick.bytes()
     }
 
     /// Cost of a random line by the surface area heuristic, see [`crate::BuildReport`].
-    pub fn sah(&self, model: &CostModel) -> f64 {
+    pub(crate) fn sah(&self, model: &CostModel) -> f64 {
         let mut objects = vec![0.0; self.roots.len()];
         for (object, &root) in self.roots.iter().enumerate() {
             let end = self.roots.get(object + 1);

@@ -56,7 +56,7 @@ impl Tree {
     ///
     /// # Errors
     /// The first broken promise, in words.
-    pub fn validate(&self) -> Result<usize, String> {
+    pub(crate) fn validate(&self) -> Result<usize, String> {
         self.block_of_empty_slots_is_empty()?;
         self.empty_slots_follow_occupied_ones()?;
         let mut boxes = LeafBoxes::default();
@@ -73,7 +73,7 @@ impl Tree {
     ///
     /// # Errors
     /// The first broken promise, in words.
-    pub fn walk(&self, leaves: &LeafBoxes) -> Result<Walked, String> {
+    pub(crate) fn walk(&self, leaves: &LeafBoxes) -> Result<Walked, String> {
         self.objects_have_roots()?;
         self.extent_holds_all_coordinates()?;
         let mut walk = Walk::new(self, leaves);
@@ -99,7 +99,7 @@ impl Tree {
     ///
     /// # Errors
     /// As [`Tree::primitives_are_whole`], if any primitive sticks out of the box of its leaf.
-    pub fn count_primitives(&self, walked: &Walked) -> Result<usize, String> {
+    pub(crate) fn count_primitives(&self, walked: &Walked) -> Result<usize, String> {
         if walked.some_stick_out {
             return self.primitives_are_whole();
         }

@@ -8,12 +8,12 @@ use core::ops::Deref;
 use crate::aabb::Aabb;
 use crate::geometry::cutout::Filters;
 use crate::geometry::instance::Placement;
+use crate::order::Plan;
 use crate::shape::Shape;
 use crate::tree::leaves::LeafBlocks;
 use crate::tree::motion::Motion;
-use crate::tree::node::Node;
+use crate::tree::node::{Node, NodeRef};
 use crate::tree::nodes::Nodes;
-use crate::tree::rule::Rule;
 use crate::tree::slot_order::{SlotOrder, occupied_first};
 use crate::tree::width::Width;
 
@@ -24,25 +24,25 @@ use crate::tree::width::Width;
 /// Children follow their parents, also from an instance to the root of its object. Triangle block 0 is empty: empty
 /// slots refer to it.
 #[derive(Clone, Debug)]
-pub(crate) struct Tree {
-    pub nodes: Nodes,
-    pub blocks: LeafBlocks,
+pub struct Tree {
+    pub(crate) nodes: Nodes,
+    pub(crate) blocks: LeafBlocks,
     /// Filters that decide about the hits of cut-out blocks.
-    pub filters: Arc<Filters>,
+    pub(crate) filters: Arc<Filters>,
     /// In visiting order.
-    pub instances: Vec<PlacedTree>,
+    pub(crate) instances: Vec<PlacedTree>,
     /// The roots of the objects, ascending.
-    pub roots: Vec<u32>,
+    pub(crate) roots: Vec<u32>,
     /// Bounds of the world.
-    pub bounds: Aabb,
+    pub(crate) bounds: Aabb,
     /// Scene extent: largest absolute coordinate, see [`crate::geometry::ray_setup`].
-    pub reach: f32,
+    pub(crate) reach: f32,
     /// Levels of nodes, the root being one: the levels of the world's tree and of the deepest object together.
-    pub depth: usize,
-    /// How occlusion queries pick the next child.
-    pub pick: Rule,
+    pub(crate) depth: usize,
+    /// The order that looks at the ray in every node; `None` where occlusion queries visit slots in their order.
+    pub(crate) pick: Option<&'static dyn Plan>,
     /// Motion during a span, if anything moves. Nodes and leaves are then at the start of the span.
-    pub motion: Option<Arc<Motion>>,
+    pub(crate) motion: Option<Arc<Motion>>,
 }
 
 /// A tree as queries see it, which are compiled for the width of its nodes.
@@ -77,7 +77,7 @@ pub(crate) struct PlacedTree {
 
 impl Tree {
     /// A tree over nothing, with these nodes: a root without children comes first.
-    pub fn over_nothing(mut nodes: Nodes, blocks: LeafBlocks) -> Self {
+    pub(crate) fn over_nothing(mut nodes: Nodes, blocks: LeafBlocks) -> Self {
         nodes.push_empty();
         Self {
             nodes,
@@ -88,41 +88,41 @@ impl Tree {
             bounds: Aabb::EMPTY,
             reach: 0.0,
             depth: 1,
-            pick: Rule::Slots,
+            pick: None,
             motion: None,
         }
     }
 
     /// A tree over nothing.
-    pub fn empty(width: Width) -> Self {
+    pub(crate) fn empty(width: Width) -> Self {
         Self::over_nothing(Nodes::with_capacity(width, 1), LeafBlocks::empty())
     }
 
-    pub fn width(&self) -> Width {
+    pub(crate) fn width(&self) -> Width {
         self.nodes.width()
     }
 
     /// Instances are numbered behind the leaves, where both are counted.
     #[inline(always)]
-    pub fn instance_index(&self, instance: usize) -> usize {
+    pub(crate) fn instance_index(&self, instance: usize) -> usize {
         self.leaf_count() + instance
     }
 
     /// How many of the nodes belong to the tree of the world; they come first.
-    pub fn top_nodes(&self) -> usize {
+    pub(crate) fn top_nodes(&self) -> usize {
         self.roots
             .first()
             .map_or(self.nodes.len(), |root| *root as usize)
     }
 
     /// Nodes that are room for others: those without children, but for roots.
-    pub fn room(&self) -> usize {
+    pub(crate) fn room(&self) -> usize {
         let top = self.nodes.iter().take(self.top_nodes()).skip(1);
         top.filter(|node| node.len() == 0).count()
     }
 
     /// Counts that a log or order must have in common with the tree.
-    pub fn shape(&self) -> Shape {
+    pub(crate) fn shape(&self) -> Shape {
         Shape {
             width: self.width().lanes(),
             nodes: self.nodes.len(),
@@ -133,7 +133,7 @@ impl Tree {
     }
 
     /// Permutes slots and leaf lanes. The order was made for a tree of this shape.
-    pub fn apply(&mut self, order: &SlotOrder) {
+    pub(crate) fn apply(&mut self, order: &SlotOrder) {
         let mut occupied = vec![0; self.width().lanes()];
         for (index, slots) in order.slots.chunks(occupied.len()).enumerate() {
             occupied.copy_from_slice(slots);
@@ -145,5 +145,27 @@ impl Tree {
             self.permute_leaves(&order.lanes);
         }
         self.pick = order.pick;
+    }
+
+    /// Number of nodes, those of objects included. Children follow their parents, also from an instance to the root of its
+    /// object.
+    pub fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// The node of this index.
+    ///
+    /// # Panics
+    /// If there is none.
+    pub fn node(&self, index: usize) -> NodeRef<'_> {
+        self.nodes.get(index)
+    }
+
+    /// The root node of the object that an instance places.
+    ///
+    /// # Panics
+    /// If there is no such instance.
+    pub fn root_of(&self, instance: usize) -> usize {
+        self.instances[instance].root as usize
     }
 }

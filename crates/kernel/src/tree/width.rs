@@ -13,17 +13,21 @@ named_list! {
     /// assert_eq!(Width::from_lanes(8), Some(Width::W8));
     /// assert_eq!(Recipe::default().width(Width::W4).width.lanes(), 4);
     /// ```
-    pub enum Width("width"): usize {
-        W4 = "4", "Four children per node: the paper's QBVH", None, 4;
-        W8 = "8", "Eight children per node: the paper's OBVH", None, 8;
-        W16 = "16", "Sixteen children per node: as many as an AVX-512 register has lanes", None, 16;
+    pub enum Width("width"): () {
+        W4 = "4", "Four children per node: the paper's QBVH", None, ();
+        W8 = "8", "Eight children per node: the paper's OBVH", None, ();
+        W16 = "16", "Sixteen children per node: as many as an AVX-512 register has lanes", None, ();
     }
 }
 
 impl Width {
     /// Children per node.
     pub const fn lanes(self) -> usize {
-        self.properties()
+        match self {
+            Self::W4 => 4,
+            Self::W8 => 8,
+            Self::W16 => 16,
+        }
     }
 
     /// The width with so many children per node; `None` unless that is 4, 8 or 16.

@@ -34,10 +34,6 @@ pub enum Kind {
     Tree,
     Object,
     World,
-    #[cfg(feature = "lab")]
-    Order,
-    #[cfg(feature = "lab")]
-    Log,
 }
 
 impl Kind {
@@ -47,10 +43,6 @@ impl Kind {
             Self::Tree => b"ANTUTREE",
             Self::Object => b"ANTUOBJT",
             Self::World => b"ANTUWRLD",
-            #[cfg(feature = "lab")]
-            Self::Order => b"ANTUSLOT",
-            #[cfg(feature = "lab")]
-            Self::Log => b"ANTULOGS",
         }
     }
 
@@ -60,10 +52,6 @@ impl Kind {
             Self::Tree => "tree",
             Self::Object => "object",
             Self::World => "world",
-            #[cfg(feature = "lab")]
-            Self::Order => "child order",
-            #[cfg(feature = "lab")]
-            Self::Log => "training log",
         }
     }
 
@@ -146,15 +134,6 @@ impl Sink<'_> {
     /// A number that may be missing, as two words. No number is NaN.
     pub fn double(&mut self, double: Option<f64>) {
         self.long(double.unwrap_or(f64::NAN).to_bits());
-    }
-
-    /// Four bytes per word, the last one filled up with zeros.
-    #[cfg(feature = "lab")]
-    pub fn bytes(&mut self, bytes: &[u8]) {
-        for bytes in bytes.chunks(4) {
-            let byte = |index: usize| bytes.get(index).copied().unwrap_or(0);
-            self.word(u32::from_le_bytes([byte(0), byte(1), byte(2), byte(3)]));
-        }
     }
 
     /// Ends the frame. `last` is [`LAST`] or 0.
@@ -415,16 +394,6 @@ impl<'a> Words<'a> {
             list.push(item);
         }
         Ok(list)
-    }
-
-    #[cfg(feature = "lab")]
-    pub fn bytes(&mut self, count: usize) -> Result<Vec<u8>, Error> {
-        let words = self.list([], count.div_ceil(4), |words| {
-            words.word().map(u32::to_le_bytes)
-        })?;
-        let mut bytes = words.into_flattened();
-        bytes.truncate(count);
-        Ok(bytes)
     }
 
     pub fn error(&self, why: impl Into<String>) -> Error {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use antumbra::lab::{Cost, Laboratory};
+use antumbra::parts::{Cost, Steps};
 use antumbra::recipe::{Builder, Collapse, Order};
 use antumbra::{Bvh, Instance, Primitives, Ray, RayMemory, Recipe};
 use antumbra_testkit::{Rng, mesh};

@@ -1,6 +1,6 @@
 //! What was dropped is named, and binary trees know what they were built over.
 
-use antumbra::lab::{BinaryTree, Laboratory, TreeLog};
+use antumbra::parts::{BinaryTree, Steps, TreeLog};
 use antumbra::recipe::{Builder, Collapse};
 use antumbra::{Bvh, DropReason, Dropped, Geometry, Instance, Isa, Primitives, Sphere, Width};
 use antumbra_testkit::{Rng, mesh};

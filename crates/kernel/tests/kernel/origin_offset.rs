@@ -1,6 +1,6 @@
 //! Rays that begin an origin offset away from a surface do not visit the leaf they leave.
 
-use antumbra::lab::{BinaryTree, Cost, Laboratory};
+use antumbra::parts::{BinaryTree, Cost, Steps};
 use antumbra::recipe::{Builder, Collapse};
 use antumbra::{Aabb, Bvh, Geometry, Isa, Primitives, Ray, Width};
 use antumbra_testkit::Rng;

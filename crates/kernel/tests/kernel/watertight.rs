@@ -1,7 +1,7 @@
 //! No ray from inside a closed mesh gets out, however exactly it is aimed at an edge or a corner.
 
 use crate::support::geometry;
-use antumbra::lab::{BinaryTree, Laboratory};
+use antumbra::parts::{BinaryTree, Steps};
 use antumbra::recipe::{Builder, Collapse};
 use antumbra::{Brute, Bvh, Isa, Primitives, Ray, Width};
 use antumbra_testkit::{Mesh, Rng, mesh};

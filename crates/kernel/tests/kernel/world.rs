@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::instances::{Expected, Scene};
 use crate::support::{Stripes, bits, cases, cutouts, geometry, square};
 use crate::transforms::{IDENTITY, transform, translation};
-use antumbra::lab::{Cost, Laboratory};
+use antumbra::parts::{Cost, Steps};
 use antumbra::recipe::{Builder, Order, Preset};
 use antumbra::{
     Bvh, Error, Functions, Geometry, Instance, Object, Primitives, Ray, Recipe, Saved,

@@ -1,6 +1,6 @@
 //! Our own engines: trees with their order, queried ray by ray or in batches.
 
-use antumbra::lab::{Laboratory, TreeLog};
+use antumbra::parts::{Steps, TreeLog};
 use antumbra::recipe::{Collapse, Order};
 use antumbra::{Build, Bvh, Error, Hit, Isa, Primitives, Ray, Recipe, Stage, Width};
 use antumbra_render::clock;

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use antumbra::Bvh;
-use antumbra::lab::Cost;
+use antumbra::parts::Cost;
 use antumbra_image::Window;
 use antumbra_render::{Observer, PathBatch, Queries, SampleCost};
 use xxhash_rust::xxh3::xxh3_64;

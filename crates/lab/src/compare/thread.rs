@@ -3,7 +3,7 @@
 //! Paths go on with the answers of one tree. Its queries are kept until there are many. Then every tree answers them,
 //! so that none has to fetch its nodes again for a few rays. All answers must agree.
 
-use antumbra::lab::{Cost, Laboratory};
+use antumbra::parts::{Cost, Steps};
 use antumbra::{Bvh, Hit, Ray};
 use antumbra_render::{PathBatch, Queries};
 

@@ -5,7 +5,7 @@
 //! turn with one and the same tree, by which they can be compared with each other although they were timed at
 //! different moments.
 
-use antumbra::lab::{Cost, Laboratory};
+use antumbra::parts::{Cost, Steps};
 use antumbra::{Bvh, Isa, Ray, Recipe, Width};
 use antumbra_render::World;
 use antumbra_scene::Camera;

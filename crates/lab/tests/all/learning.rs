@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-use antumbra::lab::{Cost, Laboratory};
+use antumbra::parts::{Cost, Steps};
 use antumbra::recipe::{Collapse, CostModel};
 use antumbra::{Build, Bvh, Ray, Recipe, Width};
 use antumbra_lab::collect_rays;

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use antumbra::lab::{Cost, Laboratory};
+use antumbra::parts::{Cost, Steps};
 use antumbra::{Bvh, Hit, Isa, MovingBvh, Ray};
 use serde::{Deserialize, Serialize};
 

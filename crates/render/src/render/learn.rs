@@ -10,7 +10,7 @@
 
 use std::time::{Duration, Instant};
 
-use antumbra::lab::{Laboratory, Log};
+use antumbra::parts::{Steps, Log};
 use antumbra::recipe::Builder;
 use antumbra::{Build, BuildMonitor, Bvh, Ray, Recipe, Stage};
 use antumbra_scene::Integrator;

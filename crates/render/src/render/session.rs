@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use antumbra::lab::Log;
+use antumbra::parts::Log;
 use antumbra::recipe::Builder;
 use antumbra::{Bvh, Ray, Recipe, Stage};
 use antumbra_image::{Image, Window};

@@ -25,7 +25,6 @@ use crate::parallel::map;
 use crate::ray::Ray;
 use crate::tree::node::Child;
 use crate::tree::refit::TreePlaces;
-use crate::tree::rule::Rule;
 use crate::tree::wide::{PlacedTree, Tree};
 
 /// From this many instances on it pays to prepare an object for them.
@@ -454,7 +453,7 @@ impl World {
         let deepest = self.objects.iter().map(|object| object.depth);
         tree.depth = top.depth + deepest.max().unwrap_or(0).max(self.ground.depth);
         // An order that is looked up by node knows nothing of the new ones.
-        tree.pick = Rule::Slots;
+        tree.pick = None;
         let dropped = placements.iter().filter(|placement| placement.is_none());
         self.bvh.dropped = self.dropped_before + dropped.count();
         self.bvh.renew_masks();

@@ -23,8 +23,6 @@ use crate::builder::binned_sah::sweep::{MAX_SWEEP, sweep};
 use crate::builder::cost::{Cost, Weigh};
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::{PrimKind, Primitives};
-#[cfg(feature = "lab")]
-use crate::lab::pieces::Piece;
 use crate::parallel::{chunk_len, concat, fill, for_each, join, map};
 use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 
@@ -44,16 +42,16 @@ pub(crate) fn build(primitives: &Primitives) -> BinaryTree {
     build_on(primitives, Isa::best())
 }
 
-/// A subtree over some of the primitives, whose root is at some depth.
-#[cfg(feature = "lab")]
-pub(crate) fn piece(primitives: &Primitives, prims: &[u32], depth: u32) -> Piece {
+/// The subtree of [`Builder::BinnedSah`](crate::recipe::Builder) over some of the primitives, which are named by their
+/// indices, with its root at some depth.
+pub fn subtree(primitives: &Primitives, prims: &[u32], depth: u32) -> BinaryTree {
     let isa = Isa::best();
     let mut items: Vec<_> = prims
         .iter()
         .map(|&prim| Planes::new(&primitives.bounds_of(prim as usize), prim))
         .collect();
     if items.is_empty() {
-        return Piece::default();
+        return BinaryTree::default();
     }
     let root = Part {
         first: 0,
@@ -62,8 +60,11 @@ pub(crate) fn piece(primitives: &Primitives, prims: &[u32], depth: u32) -> Piece
         extent: Dispatch::<8>::dispatch(isa, Measure(&items)),
     };
     let plan = Plan::new(primitives, isa, SEQUENTIAL);
-    let nodes = concat(plan.build(&mut items, root));
-    Piece::new(nodes, items.iter().map(Planes::index).collect())
+    BinaryTree {
+        nodes: concat(plan.build(&mut items, root)),
+        prims: items.iter().map(Planes::index).collect(),
+        ..BinaryTree::default()
+    }
 }
 
 /// Builds the tree on an instruction set, which makes no difference to it.
@@ -181,7 +182,7 @@ impl Plan {
             kinds: primitives
                 .kind_starts()
                 .map(|index| Planes::key(index as u32)),
-            cost: Cost::new(),
+            cost: Cost::default(),
         }
     }
 

@@ -49,8 +49,11 @@ macro_rules! define_kinds {
         /// Kind of the primitives of a leaf. Primitives are numbered kind after kind, in this order, and instances after
         /// them. A cut-out is a partly transparent triangle.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-        pub(crate) enum PrimKind {
-            $($Kind,)*
+        pub enum PrimKind {
+            $(
+                #[doc = concat!("Primitives of the kind `", stringify!($Kind), "`.")]
+                $Kind,
+            )*
         }
 
         impl PrimKind {
@@ -229,8 +232,11 @@ impl Primitives {
         })
     }
 
-    /// Kind of a primitive, which is no instance.
-    pub(crate) fn kind(&self, index: usize) -> PrimKind {
+    /// Kind of a primitive of the world itself.
+    ///
+    /// # Panics
+    /// If there is no such primitive.
+    pub fn kind(&self, index: usize) -> PrimKind {
         let starts = self.kind_starts().into_iter();
         PrimKind::ALL[starts.filter(|start| *start <= index).count()]
     }
@@ -252,8 +258,11 @@ impl Primitives {
         self.instances.get(index.checked_sub(self.len())?)
     }
 
-    /// Bounds of a primitive or an instance.
-    pub(crate) fn bounds_of(&self, index: usize) -> Aabb {
+    /// Bounds of a primitive of the world itself; of an instance behind them.
+    ///
+    /// # Panics
+    /// If there is no such primitive or instance.
+    pub fn bounds_of(&self, index: usize) -> Aabb {
         match index.checked_sub(self.len()) {
             None => match self.prim(index) {
                 Prim::Triangle(corners, _) => Aabb::around(corners),

@@ -34,7 +34,8 @@ use identity::Identity;
 use kinds::{OwnCutout, ScalarLists};
 use place::asked_for;
 
-pub(crate) use kinds::{Prim, PrimKind};
+pub(crate) use kinds::Prim;
+pub use kinds::PrimKind;
 pub(crate) use place::MAX_INSTANCES;
 
 /// Checked copies of all primitives that can be hit.
@@ -145,6 +146,16 @@ impl Primitives {
             .iter()
             .filter(|object| !object.is_empty())
             .count()
+    }
+
+    /// The primitives of each object, which have no instances; empty where no instance needs one.
+    pub fn object_list(&self) -> &[Primitives] {
+        &self.objects
+    }
+
+    /// The corners of a primitive of the world itself, if it is a triangle, opaque or not.
+    pub fn corners(&self, index: usize) -> Option<&[[f32; 3]; 3]> {
+        self.triangles.get(index)
     }
 
     /// Whether there is nothing to hit.

@@ -78,7 +78,7 @@ impl<'a> Learner<'a> {
 
     /// Finds the orders of all nodes for the rays that arrive.
     pub fn sort_all(&mut self) -> SlotOrder {
-        let mut order = SlotOrder::of_nodes(self.tree.shape());
+        let mut order = SlotOrder::of_nodes(self.tree);
         // Children follow their parents, so going backwards visits them first.
         for node in (0..self.tree.nodes.len()).rev() {
             order.set(node, &self.sort(node));

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use crate::builder::Builder;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::{Geometry, Instance};
-use crate::lab::Laboratory;
+use crate::parts::Steps;
 use crate::learn::log::Log;
 use crate::order::Order;
 use crate::order::joint::groups::least_cost;

@@ -10,7 +10,7 @@ use std::io::{self, Read, Write};
 use std::sync::Arc;
 
 use antumbra::cutout::Opacity;
-use antumbra::lab::{Cost, Laboratory};
+use antumbra::parts::{Cost, Steps};
 use antumbra::recipe::{Builder, Order};
 use antumbra::{
     Aabb, Brute, Bvh, Curves, Error, Functions, Geometry, GeometryId, Instance, Isa, Object,

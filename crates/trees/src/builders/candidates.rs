@@ -1,10 +1,8 @@
 //! All object splits, for builders that compare them with others or count rays for each: along each axis, between any
 //! two of a few items or between bins of many.
 
-use alloc::vec;
-use alloc::vec::Vec;
 
-use crate::aabb::Aabb;
+use antumbra::Aabb;
 
 /// Bins per axis. No more items than that are split between any two of them.
 const BINS: usize = 32;

@@ -13,25 +13,20 @@
 //! - The boxes of all children are tested at one go, so `C_b` and `C_k` are the same for every split and left
 //!   out, because the chance of entering a child is part of its cost. Equation (1) of Ogaki and
 //!   Derouet-Jourdan (2016) for two children is left.
-//! - The contents of a child cost, before it is built, what [`crate::builder::cost`] says, times the share that a ray
+//! - The contents of a child cost, before it is built, what [`antumbra::parts::SplitCost`] says, times the share that a ray
 //!   tests before it is stopped there: all, for a ray that is not, and `1 / (1 + k)` for one that hits `k` primitives.
 //!   Without that factor large children that stop everything look dear, and small ones are split off one by one.
-//! - Chances are blended with areas as in [`crate::lab::ray_driven::rdh`]; the imaginary rays hit nothing.
+//! - Chances are blended with areas as in [`crate::builders::ray_driven::rdh`]; the imaginary rays hit nothing.
 //! - Their tree is a second one, only for shadow rays. Ours serves any query, since answers are the same.
 
-use crate::builder::cost::Cost;
-use crate::lab::ray_driven::rdh::{blended, chance};
-use crate::lab::ray_driven::{Measure, SplitCost};
+use antumbra::parts::SplitCost as Cost;
+use crate::builders::ray_driven::rdh::{blended, chance};
+use crate::builders::ray_driven::{Measure, SplitCost};
 
 /// The cost.
-pub(crate) struct Srdh {
+#[derive(Default)]
+pub(crate) struct SrdhCost {
     cost: Cost,
-}
-
-impl Srdh {
-    pub fn new() -> Self {
-        Self { cost: Cost::new() }
-    }
 }
 
 /// Estimates of a child.
@@ -50,7 +45,7 @@ fn in_order(first: Child, second: Child) -> f64 {
     first.enter * first.cost + (1.0 - first.hit) * second.enter * second.cost
 }
 
-impl Srdh {
+impl SrdhCost {
     /// Costs of visiting left first and right first.
     fn both(&self, parent: &Measure, left: &Measure, right: &Measure) -> [f64; 2] {
         let [left, right] = [left, right].map(|side| self.child(parent, side));
@@ -70,7 +65,7 @@ impl Srdh {
     }
 }
 
-impl SplitCost for Srdh {
+impl SplitCost for SrdhCost {
     fn of(&self, parent: &Measure, left: &Measure, right: &Measure) -> f64 {
         let [left_first, right_first] = self.both(parent, left, right);
         left_first.min(right_first)

@@ -32,31 +32,27 @@
 //!
 //! A tree with instances is treated as others are: the tree of an object has its own uniform rays.
 
-use alloc::vec;
-
-use crate::aabb::Aabb;
-use crate::order::AS_THEY_ARE;
-use crate::order::arrange::{Costs, arrange};
-use crate::order::ratio::area_shares;
-use crate::tree::costs::CostModel;
-use crate::tree::node::{ChildKind, MAX_WIDTH, NodeRef, PerSlot};
-use crate::tree::slot_order::SlotOrder;
-use crate::tree::wide::Tree;
+use antumbra::Aabb;
+use antumbra::parts::{
+    ChildKind, Costs, MAX_WIDTH, NodeRef, PerSlot, SlotOrder, Tree, area_shares, arrange,
+};
+use antumbra::recipe::CostModel;
 
 /// The order of least cost for uniform rays.
 pub(crate) fn plan(tree: &Tree, model: &CostModel) -> SlotOrder {
-    let mut planned = SlotOrder::of_nodes(tree.shape());
+    let mut planned = SlotOrder::of_nodes(tree);
     // `C` and `V` of every node.
-    let mut known = vec![(0.0, 1.0); tree.nodes.len()];
+    let mut known = vec![(0.0, 1.0); tree.node_count()];
     // Children follow their parents, so going backwards visits them first.
-    for (index, node) in tree.nodes.iter().enumerate().rev() {
+    for index in (0..tree.node_count()).rev() {
+        let node = tree.node(index);
         let [mut costs, mut pass] = [[0.0; MAX_WIDTH]; 2];
         for slot in 0..node.len() {
-            (costs[slot], pass[slot]) = match node.child(slot).kind() {
+            (costs[slot], pass[slot]) = match node.kind(slot) {
                 ChildKind::Inner(child) => known[child],
                 ChildKind::Leaf(leaf) => (tree.leaf_cost(leaf, model), 0.0),
                 ChildKind::Instance(instance) => {
-                    let (cost, pass) = known[tree.instances[instance].root as usize];
+                    let (cost, pass) = known[tree.root_of(instance)];
                     (f64::from(model.entry) + cost, pass)
                 }
             };
@@ -64,11 +60,7 @@ pub(crate) fn plan(tree: &Tree, model: &CostModel) -> SlotOrder {
         let children = Uniform::new(node, costs, pass);
         let order = arrange(node.len(), &children);
         known[index] = children.of_parent(&order, f64::from(model.node));
-        let mut slots = AS_THEY_ARE;
-        for (place, from) in slots.iter_mut().zip(order) {
-            *place = from as u8;
-        }
-        planned.set(index, &slots);
+        planned.arrange(index, |place| order.get(place).copied().unwrap_or(place));
     }
     planned
 }
@@ -156,8 +148,8 @@ fn enters_both(boxes: &[Aabb; 2], enter: [f64; 2], all: &Aabb) -> f64 {
     }
     let around = f64::from(a.union(b).half_area()) / area;
     let within = Aabb {
-        min: core::array::from_fn(|axis| a.min[axis].max(b.min[axis])),
-        max: core::array::from_fn(|axis| a.max[axis].min(b.max[axis])),
+        min: std::array::from_fn(|axis| a.min[axis].max(b.min[axis])),
+        max: std::array::from_fn(|axis| a.max[axis].min(b.max[axis])),
     };
     let common = if within.is_empty() {
         0.0
@@ -172,7 +164,7 @@ fn enters_both(boxes: &[Aabb; 2], enter: [f64; 2], all: &Aabb) -> f64 {
         .map(|difference| difference * difference)
         .sum();
     // 2 · area is the whole area.
-    let form_factor = enter[0] * enter[1] * 2.0 * area / (8.0 * core::f64::consts::PI * distance2);
+    let form_factor = enter[0] * enter[1] * 2.0 * area / (8.0 * std::f64::consts::PI * distance2);
     let certain = (enter[0] + enter[1] - around).max(common).max(0.0);
     // `min` takes the other one for 0 / 0.
     form_factor.min(least).max(certain.min(least))
@@ -181,7 +173,7 @@ fn enters_both(boxes: &[Aabb; 2], enter: [f64; 2], all: &Aabb) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::order::ratio::{ChildCost, cost_any};
+    use antumbra::parts::{ChildCost, cost_any};
     use antumbra_testkit::Rng;
 
     /// Children with any chances that there can be: `I_l + I_r - I_lr` is at most 1.
@@ -234,14 +226,14 @@ mod tests {
     fn independent_children_give_the_learned_model() {
         let mut rng = Rng::new(2016);
         for _ in 0..300 {
-            let enter: [f64; 5] = core::array::from_fn(|_| f64::from(rng.range(0.01, 1.0)));
+            let enter: [f64; 5] = std::array::from_fn(|_| f64::from(rng.range(0.01, 1.0)));
             let children = Uniform {
                 enter,
-                both: core::array::from_fn(|i| core::array::from_fn(|j| enter[i] * enter[j])),
-                costs: core::array::from_fn(|_| f64::from(rng.range(0.1, 9.0))),
-                pass: core::array::from_fn(|_| f64::from(rng.unit())),
+                both: std::array::from_fn(|i| std::array::from_fn(|j| enter[i] * enter[j])),
+                costs: std::array::from_fn(|_| f64::from(rng.range(0.1, 9.0))),
+                pass: std::array::from_fn(|_| f64::from(rng.unit())),
             };
-            let models: [_; 5] = core::array::from_fn(|i| ChildCost {
+            let models: [_; 5] = std::array::from_fn(|i| ChildCost {
                 enter: enter[i],
                 hit: enter[i] * (1.0 - children.pass[i]),
                 cost: children.costs[i],
@@ -271,7 +263,7 @@ mod tests {
     /// directions. Counts the lines that hit `all`, and of these the lines that hit the first, the second and both.
     fn count_lines(rng: &mut Rng, all: &Aabb, boxes: &[Aabb; 2], lines: usize) -> [f64; 4] {
         let center: [f64; 3] =
-            core::array::from_fn(|axis| 0.5 * f64::from(all.min[axis] + all.max[axis]));
+            std::array::from_fn(|axis| 0.5 * f64::from(all.min[axis] + all.max[axis]));
         let radius = (0..3)
             .map(|axis| (0.5 * f64::from(all.max[axis] - all.min[axis])).powi(2))
             .sum::<f64>()
@@ -281,17 +273,17 @@ mod tests {
             let dir = rng.direction().map(f64::from);
             let point = loop {
                 let point: [f64; 3] =
-                    core::array::from_fn(|_| f64::from(rng.range(-1.2, 1.2)) * radius);
+                    std::array::from_fn(|_| f64::from(rng.range(-1.2, 1.2)) * radius);
                 // Projected along the line, the points of a ball would crowd in the middle; points of a disc do not.
                 let along: f64 = (0..3).map(|axis| point[axis] * dir[axis]).sum();
-                let across: [f64; 3] = core::array::from_fn(|axis| point[axis] - along * dir[axis]);
+                let across: [f64; 3] = std::array::from_fn(|axis| point[axis] - along * dir[axis]);
                 let distance2: f64 = across.iter().map(|x| x * x).sum();
                 // A cylinder along the line, of the length of its width.
                 if along.abs() < radius / 2.0 && distance2 < radius * radius {
                     break across;
                 }
             };
-            let org = core::array::from_fn(|axis| center[axis] + point[axis]);
+            let org = std::array::from_fn(|axis| center[axis] + point[axis]);
             if meets(org, dir, all) {
                 let [a, b] = [0, 1].map(|which: usize| meets(org, dir, &boxes[which]));
                 counts[0] += 1.0;
@@ -304,7 +296,7 @@ mod tests {
     }
 
     fn random_box(rng: &mut Rng) -> Aabb {
-        let min = core::array::from_fn(|_| rng.range(0.0, 0.8));
+        let min = std::array::from_fn(|_| rng.range(0.0, 0.8));
         Aabb {
             min,
             max: min.map(|x| (x + rng.range(0.02, 0.5)).min(1.0)),

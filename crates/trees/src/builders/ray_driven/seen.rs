@@ -3,20 +3,15 @@
 //! Training rays are few, and most primitives of a large scene are on none of them. So every start sends further rays,
 //! into random directions of the half space of its training ray, until more of them find hardly anything new.
 
-use alloc::vec;
-use alloc::vec::Vec;
 
-use antumbra_simd::{Dispatch, Isa};
-
-use super::found;
-use crate::builder::Builder;
-use crate::geometry::primitives::Primitives;
-use crate::geometry::ray_setup::RaySetup;
-use crate::hash::Random;
-use crate::parallel;
-use crate::ray::Ray;
-use crate::trace::binary::{Exhaustive, LeafHits, Witness};
-use crate::tree::binary::BinaryTree;
+use antumbra::recipe::Builder;
+use antumbra::Primitives;
+use antumbra::parts::RaySetup;
+use antumbra::parts::Random;
+use rayon::prelude::*;
+use antumbra::Ray;
+use antumbra::parts::{LeafHits, Witness, follow};
+use antumbra::parts::BinaryTree;
 
 /// Rays of the first round. Every further round has as many as all rounds before it.
 const FIRST: usize = 1 << 14;
@@ -67,9 +62,14 @@ impl Seen {
         all
     }
 
+    /// Primitives of the world, or of an object, which are number 1 and up.
+    pub fn of(&self, place: usize) -> &[bool] {
+        place.checked_sub(1).map_or(&self.world, |object| &self.objects[object])
+    }
+
     /// Nothing is seen.
     pub fn none(primitives: &Primitives) -> Self {
-        let objects = primitives.objects.iter();
+        let objects = primitives.object_list().iter();
         Self {
             world: vec![false; primitives.len()],
             objects: objects.map(|object| vec![false; object.len()]).collect(),
@@ -83,19 +83,13 @@ impl Seen {
 
     /// Adds what these rays see.
     pub fn follow(&mut self, primitives: &Primitives, tree: &BinaryTree, rays: &[Ray]) {
-        let chunks = parallel::map(rays.len().div_ceil(CHUNK), 1, |chunk| {
+        let chunks = rays.par_chunks(CHUNK).map(|rays| {
             let mut world = Nearest::default();
             let mut objects: Vec<_> = self.objects.iter().map(|_| Nearest::default()).collect();
-            Isa::best().dispatch(Exhaustive {
-                primitives,
-                tree,
-                rays: &rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)],
-                world: &mut world,
-                objects: &mut objects,
-            });
+            follow(primitives, tree, rays, &mut world, &mut objects);
             (world, objects)
         });
-        for (world, objects) in chunks {
+        for (world, objects) in chunks.collect::<Vec<_>>() {
             for prim in world.prims {
                 self.world[prim as usize] = true;
             }
@@ -141,10 +135,10 @@ impl Witness for Nearest {
     fn node(&mut self, _: u32) {}
 
     fn hits(&mut self, ray: &RaySetup, hits: LeafHits<'_>) {
-        for (prim, hit) in found(hits, ray) {
+        for (prim, distance) in hits.prims(ray) {
             // Of equal distances the smaller index, whatever the tree.
-            if self.found.is_none_or(|found| (hit.t, prim) < found) {
-                self.found = Some((hit.t, prim));
+            if self.found.is_none_or(|found| (distance, prim) < found) {
+                self.found = Some((distance, prim));
             }
         }
     }

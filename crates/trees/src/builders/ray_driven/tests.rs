@@ -1,20 +1,18 @@
 //! Counts against counting; costs against the models they come from.
 
-use alloc::format;
-use alloc::vec::Vec;
 
-use crate::builder::Builder;
-use crate::builder::cost::Cost;
-use crate::geometry::ray_setup::RaySetup;
+use antumbra::recipe::Builder;
+use antumbra::parts::SplitCost as Cost;
+use antumbra::parts::RaySetup;
 use crate::geometry::test_primitives::primitives;
-use crate::geometry::{Geometry, Instance, QueryKind};
-use crate::lab::ray_driven::evidence::AllEvidence;
-use crate::lab::ray_driven::rdh::Rdh;
-use crate::lab::ray_driven::seen::Seen;
-use crate::lab::ray_driven::srdh::Srdh;
-use crate::lab::ray_driven::*;
-use crate::learn::surface_rays::surface_rays;
-use crate::ray::Ray;
+use antumbra::{Geometry, Instance};
+use crate::builders::ray_driven::evidence::AllEvidence;
+use crate::builders::ray_driven::rdh::Rdh;
+use crate::builders::ray_driven::seen::Seen;
+use crate::builders::ray_driven::srdh::Srdh;
+use crate::builders::ray_driven::*;
+use antumbra::parts::surface_rays;
+use antumbra::Ray;
 use antumbra_testkit::{Rng, mesh};
 
 /// Everything a side of a split is said to have is counted again, ray by ray and primitive by primitive.
@@ -105,7 +103,7 @@ fn evidence_is_that_of_brute_force() {
     let instances: Vec<_> = (0..10)
         .map(|_| Instance {
             object: 0,
-            transform: core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-1.0, 1.0))),
+            transform: std::array::from_fn(|_| std::array::from_fn(|_| rng.range(-1.0, 1.0))),
         })
         .collect();
     let primitives =
@@ -182,7 +180,7 @@ const PARENT: Measure = Measure {
 #[test]
 fn evidence_by_area_gives_the_surface_area_heuristic() {
     let mut rng = Rng::new(72);
-    let cost = Cost::new();
+    let cost = Cost::default();
     for _ in 0..1000 {
         let sides = [(); 2].map(|()| {
             let eighths = rng.below(9);
@@ -229,7 +227,7 @@ fn uniform_rays_enter_boxes_by_area() {
             let [a, b] = [(); 2].map(|()| rng.range(parent.min[axis], parent.max[axis]));
             (child.min[axis], child.max[axis]) = (a.min(b), a.max(b));
         }
-        let found = crate::lab::ray_driven::rdh::chance(&measure(&child), &whole);
+        let found = crate::builders::ray_driven::rdh::chance(&measure(&child), &whole);
         let expected = measure(&child).area_share(&whole);
         // Four standard errors of 10,000 rays or more.
         assert!(
@@ -243,7 +241,7 @@ fn uniform_rays_enter_boxes_by_area() {
 /// order of appendix A.
 #[test]
 fn srdh_is_the_model_for_two_children() {
-    use crate::order::ratio::{ChildCost, cost_any};
+    use antumbra::parts::{ChildCost, cost_any};
     let mut rng = Rng::new(74);
     let srdh = Srdh::new();
     for _ in 0..1000 {
@@ -318,8 +316,8 @@ fn seen_is_what_is_nearest() {
         [&object, &world].map(|mesh| [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])]);
     let instance = Instance {
         object: 0,
-        transform: core::array::from_fn(|row| {
-            core::array::from_fn(|column| f32::from(u8::from(row == column)))
+        transform: std::array::from_fn(|row| {
+            std::array::from_fn(|column| f32::from(u8::from(row == column)))
         }),
     };
     let primitives =
@@ -355,7 +353,7 @@ fn seen_is_what_is_nearest() {
 #[test]
 fn vdbvh_makes_the_split_of_least_cost() {
     let mut rng = Rng::new(78);
-    let cost = Cost::new();
+    let cost = Cost::default();
     for weight in [0.0, 0.5, 0.9, 1.0] {
         let mesh = mesh::soup(&mut rng, 400);
         let primitives = primitives(&mesh, 5, &mut rng);

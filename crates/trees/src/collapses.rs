@@ -1,23 +1,66 @@
-//! RSC: nodes that sample rays visit often are contracted into their parents.
+//! Collapses. RSC: nodes that sample rays visit often are contracted into their parents.
 //!
 //! Source: Gu, He and Blelloch (2015), "Ray Specialized Contraction on Bounding Volume Hierarchies". Theirs
 //! contracts edges until nodes have as many children as a cost model wants; here nodes have a fixed width, so every
 //! node is filled: of its children the one that is visited most is opened, again and again. Opening a child saves
-//! its visits. Unlike [`crate::collapse::cheapest`] it does not look ahead.
+//! its visits. Unlike the kernel's learned collapse it does not look ahead.
 
-use alloc::vec::Vec;
+use antumbra::parts::{BinaryTree, Children, Contract, Contraction, Contractor};
+use antumbra::recipe::{Collapse, UnknownName};
 
-use crate::collapse::skeleton::{Children, Contraction};
-use crate::tree::binary::BinaryTree;
+use crate::{find, rows};
+
+rows! {
+    Unsorted = "learned-unsorted", "The nodes of `learned`, whose children stay in the order of the binary tree: for ablations", None;
+    Rsc = "rsc", "Children that training rays visit most are opened first", Some("Gu, He and Blelloch 2015");
+}
+
+/// The nodes of [`Collapse::Learned`], whose children stay in the order of the binary tree.
+pub const LEARNED_UNSORTED: Collapse = Collapse::Other(&Unsorted);
+/// Ray specialized contraction (Gu, He and Blelloch 2015).
+pub const RSC: Collapse = Collapse::Other(&Rsc);
+
+/// Collapses of the kernel and of this crate.
+pub const COLLAPSES: [Collapse; 5] = [
+    Collapse::Area,
+    Collapse::Sah,
+    Collapse::Learned,
+    LEARNED_UNSORTED,
+    RSC,
+];
+
+/// The collapse of this name among [`COLLAPSES`].
+///
+/// # Errors
+/// Another name, with those that there are.
+pub fn collapse(name: &str) -> Result<Collapse, UnknownName> {
+    find("collapse", &COLLAPSES, Collapse::name, name)
+}
+
+impl Contract for Unsorted {
+    fn sorts(&self) -> bool {
+        false
+    }
+
+    fn contraction(&self) -> Option<Contractor> {
+        None
+    }
+}
+
+impl Contract for Rsc {
+    fn contraction(&self) -> Option<Contractor> {
+        Some(|_, visits, _| Box::new(RscCollapse::new(visits)))
+    }
+}
 
 /// How often each binary node is visited.
-pub(crate) struct RscCollapse {
+struct RscCollapse {
     visits: Vec<f32>,
 }
 
 impl RscCollapse {
     /// For rays that visit each inner binary node so often.
-    pub fn new(visits: &[f32]) -> Self {
+    fn new(visits: &[f32]) -> Self {
         Self {
             visits: visits.to_vec(),
         }
@@ -49,11 +92,9 @@ impl Contraction for RscCollapse {
 
 #[cfg(test)]
 mod tests {
-    use alloc::vec;
-
     use super::*;
-    use crate::builder::Builder;
-    use crate::geometry::test_primitives::primitives;
+    use antumbra::recipe::Builder;
+    use antumbra::{Geometry, Primitives};
     use antumbra_testkit::{Rng, mesh};
 
     /// Below a full node nothing is visited more than any node that was opened for it.
@@ -61,7 +102,8 @@ mod tests {
     fn what_is_visited_most_is_opened() {
         let mut rng = Rng::new(66);
         let mesh = mesh::soup(&mut rng, 500);
-        let primitives = primitives(&mesh, 0, &mut rng);
+        let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
+        let primitives = Primitives::new(&geometry).expect("indices in range");
         let tree = BinaryTree::build(&primitives, Builder::default());
         // Rays that visit a node visit its parent, too.
         let mut visits = vec![1000.0; tree.nodes.len()];

@@ -3,18 +3,14 @@
 //! The rays are followed to their ends through a tree of binned SAH, so every primitive that they hit is
 //! known, not only the nearest. An object has the rays of all its instances.
 
-use alloc::vec::Vec;
 
-use antumbra_simd::{Dispatch, Isa};
-
-use super::found;
-use crate::builder::Builder;
-use crate::geometry::primitives::Primitives;
-use crate::geometry::ray_setup::RaySetup;
-use crate::parallel;
-use crate::ray::Ray;
-use crate::trace::binary::{Exhaustive, LeafHits, Witness};
-use crate::tree::binary::BinaryTree;
+use antumbra::recipe::Builder;
+use antumbra::Primitives;
+use antumbra::parts::RaySetup;
+use rayon::prelude::*;
+use antumbra::Ray;
+use antumbra::parts::{LeafHits, Witness, follow};
+use antumbra::parts::BinaryTree;
 
 /// At most this many rays are used. Of more rays, every second, third, ... is used.
 const MOST_RAYS: usize = 1 << 14;
@@ -50,18 +46,13 @@ impl AllEvidence {
         let tree = BinaryTree::build(primitives, Builder::BinnedSah);
         let stride = rays.len().div_ceil(MOST_RAYS);
         let rays: Vec<_> = rays.iter().copied().step_by(stride).collect();
-        let chunks = parallel::map(rays.len().div_ceil(CHUNK), 1, |chunk| {
+        let chunks = rays.par_chunks(CHUNK).map(|rays| {
             let mut all = Self::none(primitives);
-            Isa::best().dispatch(Exhaustive {
-                primitives,
-                tree: &tree,
-                rays: &rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)],
-                world: &mut all.world,
-                objects: &mut all.objects,
-            });
+            let Self { world, objects } = &mut all;
+            follow(primitives, &tree, rays, world, objects);
             all
         });
-        for chunk in chunks {
+        for chunk in chunks.collect::<Vec<_>>() {
             all.world.append(chunk.world);
             for (evidence, object) in all.objects.iter_mut().zip(chunk.objects) {
                 if evidence.rays.len() < MOST_RAYS_IN_OBJECT {
@@ -72,9 +63,14 @@ impl AllEvidence {
         all
     }
 
+    /// The rays of the world, or of an object, which are number 1 and up.
+    pub fn of(&self, place: usize) -> &Evidence {
+        place.checked_sub(1).map_or(&self.world, |object| &self.objects[object])
+    }
+
     /// No rays.
     pub fn none(primitives: &Primitives) -> Self {
-        let objects = primitives.objects.iter();
+        let objects = primitives.object_list().iter();
         Self {
             world: Evidence::default(),
             objects: objects.map(|_| Evidence::default()).collect(),
@@ -97,7 +93,7 @@ impl Witness for Evidence {
     fn hits(&mut self, ray: &RaySetup, hits: LeafHits<'_>) {
         let of_ray = self.rays.len() as u32 - 1;
         self.hits
-            .extend(found(hits, ray).map(|(prim, _)| (of_ray, prim)));
+            .extend(hits.prims(ray).map(|(prim, _)| (of_ray, prim)));
     }
 
     fn end(&mut self) {}

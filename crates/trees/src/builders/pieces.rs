@@ -1,10 +1,8 @@
 //! Subtrees put together from below, for builders that make no more of it than that.
 
-use alloc::vec;
-use alloc::vec::Vec;
 
-use crate::aabb::Aabb;
-use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
+use antumbra::Aabb;
+use antumbra::parts::{BinaryKind, BinaryNode, BinaryTree};
 
 /// A subtree: its nodes in depth-first order, and what its leaves hold, leaf after leaf.
 #[derive(Default)]
@@ -14,11 +12,6 @@ pub(crate) struct Piece {
 }
 
 impl Piece {
-    /// Nodes that refer to `prims` from its beginning.
-    pub fn new(nodes: Vec<BinaryNode>, prims: Vec<u32>) -> Self {
-        Self { nodes, prims }
-    }
-
     /// A leaf.
     pub fn leaf(bounds: Aabb, prims: Vec<u32>) -> Self {
         let kind = BinaryKind::Leaf {
@@ -53,10 +46,13 @@ impl Piece {
 
     /// The whole tree.
     pub fn into_tree(self) -> BinaryTree {
-        BinaryTree {
-            nodes: self.nodes,
-            prims: self.prims,
-            ..BinaryTree::default()
-        }
+        BinaryTree::new(self.nodes, self.prims)
+    }
+}
+
+impl From<BinaryTree> for Piece {
+    fn from(tree: BinaryTree) -> Self {
+        let BinaryTree { nodes, prims, .. } = tree;
+        Self { nodes, prims }
     }
 }

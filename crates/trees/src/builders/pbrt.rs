@@ -5,15 +5,13 @@
 //! of the centres (Pharr, Jakob and Humphreys 2016, section 4.3.2). How small leaves are changed in November 2015, and
 //! the paper does not say from which state of pbrt-v3 it started. Both [rules](Rule) are here.
 
-use alloc::vec::Vec;
 
-use crate::aabb::Aabb;
-use crate::builder::binned_sah;
-use crate::geometry::primitives::Primitives;
-use crate::lab::candidates::center;
-use crate::lab::pieces::Piece;
-use crate::parallel;
-use crate::tree::binary::BinaryTree;
+use antumbra::Aabb;
+use antumbra::parts::binned_subtree;
+use antumbra::Primitives;
+use crate::builders::candidates::center;
+use crate::builders::pieces::Piece;
+use antumbra::parts::BinaryTree;
 
 /// Buckets along the axis.
 const BUCKETS: usize = 12;
@@ -72,7 +70,7 @@ impl Item {
     fn new(primitives: &Primitives, index: usize) -> Self {
         let bounds = primitives.bounds_of(index);
         Self {
-            center: core::array::from_fn(|axis| center(&bounds, axis)),
+            center: std::array::from_fn(|axis| center(&bounds, axis)),
             bounds,
             index: index as u32,
         }
@@ -121,7 +119,7 @@ impl Plan<'_> {
             right = items.split_off(count / 2);
         }
         let (left, right) = if count > SEQUENTIAL {
-            parallel::join(
+            rayon::join(
                 || self.piece(items, depth + 1),
                 || self.piece(right, depth + 1),
             )
@@ -133,7 +131,7 @@ impl Plan<'_> {
 
     fn leaf(&self, items: &[Item], depth: u32) -> Piece {
         let prims: Vec<u32> = items.iter().map(|item| item.index).collect();
-        binned_sah::piece(self.primitives, &prims, depth)
+        Piece::from(binned_subtree(self.primitives, &prims, depth))
     }
 
     fn best_split(&self, items: &[Item], whole: &Aabb, bucket: impl Fn(&Item) -> usize) -> Split {
@@ -192,8 +190,8 @@ fn longest(items: &[Item]) -> (usize, f32, f32) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Geometry;
-    use crate::tree::binary::BinaryKind;
+    use antumbra::Geometry;
+    use antumbra::parts::BinaryKind;
 
     /// Squares across the x axis, each of two triangles, at these places.
     fn squares(places: &[f32], size: f32) -> Primitives {

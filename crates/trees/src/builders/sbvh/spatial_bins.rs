@@ -3,10 +3,10 @@
 //! Source: the chopped binning of Stich, Friedrich and Dietrich (2009), "Spatial Splits in Bounding Volume
 //! Hierarchies", section 4.3.
 
-use crate::aabb::Aabb;
-use crate::builder::cost::Cost;
-use crate::geometry::primitives::Primitives;
-use crate::lab::sbvh::clip::{box_between, triangle_between};
+use antumbra::Aabb;
+use antumbra::parts::SplitCost as Cost;
+use antumbra::Primitives;
+use crate::builders::sbvh::clip::{box_between, triangle_between};
 
 /// Slabs per axis.
 const BINS: usize = 16;
@@ -22,7 +22,7 @@ pub(crate) struct Reference {
 impl Reference {
     /// The box around what of it lies between two coordinates; empty if nothing does.
     pub fn between(&self, primitives: &Primitives, axis: usize, slab: [f32; 2]) -> Aabb {
-        match primitives.triangles.get(self.prim as usize) {
+        match primitives.corners(self.prim as usize) {
             Some(corners) => triangle_between(corners, &self.bounds, axis, slab),
             None => box_between(&self.bounds, axis, slab),
         }

@@ -4,10 +4,10 @@
 //! Structures": the chance that a ray which enters a node enters a child is the share of the sample rays that do,
 //! blended with the share of the area, `w R_child / R + (1 - w) A_child / A`. Here the weight grows with the
 //! evidence, `w = R / (R + PRIOR)`, as if [`PRIOR`] more rays had entered boxes by their areas; and what is in a
-//! child costs what [`crate::builder::cost`] says instead of its number.
+//! child costs what [`antumbra::parts::SplitCost`] says instead of its number.
 
-use crate::builder::cost::Cost;
-use crate::lab::ray_driven::{Measure, SplitCost};
+use antumbra::parts::SplitCost as Cost;
+use crate::builders::ray_driven::{Measure, SplitCost};
 
 /// Weight of the areas, in rays.
 const PRIOR: f64 = 16.0;
@@ -24,17 +24,12 @@ pub(crate) fn chance(child: &Measure, parent: &Measure) -> f64 {
 }
 
 /// The cost.
-pub(crate) struct Rdh {
+#[derive(Default)]
+pub(crate) struct RdhCost {
     cost: Cost,
 }
 
-impl Rdh {
-    pub fn new() -> Self {
-        Self { cost: Cost::new() }
-    }
-}
-
-impl SplitCost for Rdh {
+impl SplitCost for RdhCost {
     fn of(&self, parent: &Measure, left: &Measure, right: &Measure) -> f64 {
         let side =
             |side: &Measure| chance(side, parent) * f64::from(self.cost.weight_of(side.prims));

@@ -3,24 +3,21 @@
 //! Source: Vinkler, Havran and Sochor (2012), "Visibility Driven BVH Build Up Algorithm for Ray Tracing": the chance that
 //! a ray which enters a node enters a child is the child's share of the visible primitives, mixed with its share of the
 //! area, `w O_child / O + (1 - w) A_child / A`. Nodes in which nothing is seen are split by areas. Choices made here:
-//! - [`crate::lab::ray_driven::seen`] says which primitives are seen, and how many rays are enough.
+//! - [`crate::builders::ray_driven::seen`] says which primitives are seen, and how many rays are enough.
 //! - [`WEIGHT`] is `w`. The formula is from memory: only the abstract of the paper was available.
-//! - The contents of a child cost what [`crate::builder::cost`] says, for all primitives, seen or not.
+//! - The contents of a child cost what [`antumbra::parts::SplitCost`] says, for all primitives, seen or not.
 //! - Nodes in which nothing is seen are divided as finely as the others: answers need no visibility.
 
-use alloc::vec;
-use alloc::vec::Vec;
 
 use super::{MAX_DEPTH, SEQUENTIAL, area};
-use crate::aabb::Aabb;
-use crate::builder::binned_sah;
-use crate::builder::cost::Cost;
-use crate::geometry::BLOCK;
-use crate::geometry::primitives::Primitives;
-use crate::lab::candidates::{Candidates, Part};
-use crate::lab::pieces::Piece;
-use crate::parallel;
-use crate::tree::binary::BinaryTree;
+use antumbra::Aabb;
+use antumbra::parts::binned_subtree;
+use antumbra::parts::SplitCost as Cost;
+use antumbra::parts::BLOCK;
+use antumbra::Primitives;
+use crate::builders::candidates::{Candidates, Part};
+use crate::builders::pieces::Piece;
+use antumbra::parts::BinaryTree;
 
 /// Weight of visibility against area.
 pub(crate) const WEIGHT: f64 = 0.9;
@@ -66,7 +63,7 @@ impl<'a> Plan<'a> {
             primitives,
             seen,
             weight,
-            cost: Cost::new(),
+            cost: Cost::default(),
         }
     }
 
@@ -74,10 +71,10 @@ impl<'a> Plan<'a> {
         let seen: Vec<_> = prims.iter().map(|prim| self.seen[*prim as usize]).collect();
         let hidden = !seen.contains(&true);
         if prims.len() <= BLOCK || hidden || depth >= MAX_DEPTH {
-            return binned_sah::piece(self.primitives, &prims, depth);
+            return Piece::from(binned_subtree(self.primitives, &prims, depth));
         }
         let Some(split) = self.best_split(&prims, &seen) else {
-            return binned_sah::piece(self.primitives, &prims, depth);
+            return Piece::from(binned_subtree(self.primitives, &prims, depth));
         };
         let is_large = prims.len() > SEQUENTIAL;
         let mut sides = [Vec::new(), Vec::new()];
@@ -86,7 +83,7 @@ impl<'a> Plan<'a> {
         }
         let [left, right] = sides;
         let (left, right) = if is_large {
-            parallel::join(
+            rayon::join(
                 || self.piece(left, depth + 1),
                 || self.piece(right, depth + 1),
             )

@@ -5,8 +5,6 @@
 //! judged by exact counts of both on its two sides. Where fewer than [`MIN_RAYS`] rays come there is nothing to be
 //! learned, and binned SAH goes on; without rays the tree is the tree of binned SAH.
 
-use alloc::vec;
-use alloc::vec::Vec;
 
 pub(crate) mod evidence;
 pub(crate) mod rdh;
@@ -14,19 +12,14 @@ pub(crate) mod seen;
 pub(crate) mod srdh;
 pub(crate) mod vdbvh;
 
-use crate::aabb::Aabb;
-use crate::builder::binned_sah;
-use crate::geometry::primitives::Primitives;
-use crate::geometry::ray_setup::RaySetup;
-use crate::geometry::slab_test::hits_box;
-use crate::geometry::{BLOCK, QueryKind};
-use crate::lab::candidates::Candidates;
-use crate::lab::pieces::Piece;
-use crate::lab::ray_driven::evidence::Evidence;
-use crate::parallel;
-use crate::ray::Hit;
-use crate::trace::binary::LeafHits;
-use crate::tree::binary::BinaryTree;
+use antumbra::Aabb;
+use antumbra::parts::binned_subtree;
+use antumbra::Primitives;
+use antumbra::parts::BLOCK;
+use crate::builders::candidates::Candidates;
+use crate::builders::pieces::Piece;
+use crate::builders::ray_driven::evidence::Evidence;
+use antumbra::parts::BinaryTree;
 
 /// Nodes that fewer rays enter are split by areas.
 const MIN_RAYS: usize = 4;
@@ -36,21 +29,6 @@ const MAX_DEPTH: u32 = 56;
 
 /// Nodes of fewer primitives and rays than this are the work of one thread.
 const SEQUENTIAL: usize = 1024;
-
-/// Primitives of a leaf that a ray hits, with their hits. Instances are left out.
-fn found(hits: LeafHits<'_>, ray: &RaySetup) -> impl Iterator<Item = (u32, Hit)> {
-    let (primitives, prims) = (hits.primitives, hits.prims);
-    hits.filter_map(move |lane| {
-        let prim = prims[lane];
-        match primitives.instance(prim as usize) {
-            Some(_) => None,
-            None => {
-                let hit = primitives.hit(prim as usize, ray, QueryKind::Occluded)?;
-                Some((prim, hit))
-            }
-        }
-    })
-}
 
 /// Measures of a node, or of one side of a split.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -141,13 +119,13 @@ struct Split {
 impl<C: SplitCost> Plan<'_, C> {
     fn entering(&self, rays: impl IntoIterator<Item = u32>, bounds: &Aabb) -> Vec<u32> {
         rays.into_iter()
-            .filter(|ray| hits_box(&self.evidence.rays[*ray as usize], bounds))
+            .filter(|ray| self.evidence.rays[*ray as usize].hits_box(bounds))
             .collect()
     }
 
     fn piece(&self, node: Node) -> Piece {
         if node.prims.len() <= BLOCK || node.rays.len() < MIN_RAYS || node.depth >= MAX_DEPTH {
-            return binned_sah::piece(self.primitives, &node.prims, node.depth);
+            return Piece::from(binned_subtree(self.primitives, &node.prims, node.depth));
         }
         let boxes: Vec<_> = node
             .prims
@@ -155,12 +133,12 @@ impl<C: SplitCost> Plan<'_, C> {
             .map(|prim| self.primitives.bounds_of(*prim as usize))
             .collect();
         let Some(split) = self.best_split(&node, &boxes) else {
-            return binned_sah::piece(self.primitives, &node.prims, node.depth);
+            return Piece::from(binned_subtree(self.primitives, &node.prims, node.depth));
         };
         let size = node.prims.len() + node.rays.len();
         let [left, right] = self.halves(node, &split);
         let (left, right) = if size > SEQUENTIAL {
-            parallel::join(|| self.piece(left), || self.piece(right))
+            rayon::join(|| self.piece(left), || self.piece(right))
         } else {
             (self.piece(left), self.piece(right))
         };
@@ -276,13 +254,13 @@ impl<C: SplitCost> Plan<'_, C> {
             // The boxes on one side of ever later splits hold each other, so a search finds the first that is
             // entered.
             let first = first_true(1, len, |split| {
-                hits_box(ray, &candidates.left[split].bounds)
+                ray.hits_box(&candidates.left[split].bounds)
             });
             if let Some(side) = sides.get_mut(first) {
                 side[0].entered += 1;
             }
             let end = first_true(1, len, |split| {
-                !hits_box(ray, &candidates.right[split].bounds)
+                !ray.hits_box(&candidates.right[split].bounds)
             });
             sides[end - 1][1].entered += 1;
         }

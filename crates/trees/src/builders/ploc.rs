@@ -10,15 +10,14 @@
 //! - Theirs chooses by the surface area heuristic which subtrees become leaves. Here it is all that fit a leaf
 //!   block, which is tested at one go.
 
-use alloc::vec;
-use alloc::vec::Vec;
 
-use crate::aabb::Aabb;
-use crate::geometry::BLOCK;
-use crate::geometry::primitives::{PrimKind, Primitives};
-use crate::lab::pieces::Piece;
-use crate::parallel;
-use crate::tree::binary::BinaryTree;
+use antumbra::Aabb;
+use antumbra::parts::BLOCK;
+use antumbra::Primitives;
+use antumbra::parts::PrimKind;
+use crate::builders::pieces::Piece;
+use rayon::prelude::*;
+use antumbra::parts::BinaryTree;
 
 /// How far a cluster looks in either direction; their quality setting.
 const RADIUS: usize = 16;
@@ -80,7 +79,8 @@ pub(crate) fn build(primitives: &Primitives) -> BinaryTree {
 fn in_order_of_a_curve(primitives: &Primitives) -> Vec<Cluster> {
     /// Cells per axis: 2 to this.
     const BITS: u32 = 21;
-    let bounds = parallel::map(primitives.len(), CHUNK, |index| primitives.bounds_of(index));
+    let indices = (0..primitives.len()).into_par_iter().with_min_len(CHUNK);
+    let bounds: Vec<_> = indices.map(|index| primitives.bounds_of(index)).collect();
     let center = |bounds: &Aabb, axis: usize| {
         0.5 * (f64::from(bounds.min[axis]) + f64::from(bounds.max[axis]))
     };
@@ -95,14 +95,16 @@ fn in_order_of_a_curve(primitives: &Primitives) -> Vec<Cluster> {
     let cells = f64::from(1u32 << BITS);
     // The same scale on all axes, so that cells are cubes; 0 where all centres coincide.
     let scale = if spread > 0.0 { cells / spread } else { 0.0 };
-    let mut codes = parallel::map(bounds.len(), CHUNK, |index| {
+    let code = |index: usize| {
         let mut code = 0;
         for axis in 0..3 {
             let cell = (center(&bounds[index], axis) - low[axis]) * scale;
             code |= spread_bits((cell as u64).min((1 << BITS) - 1)) << axis;
         }
         (code, index as u32)
-    });
+    };
+    let indices = (0..bounds.len()).into_par_iter().with_min_len(CHUNK);
+    let mut codes: Vec<_> = indices.map(code).collect();
     codes.sort_unstable();
     let clusters = codes.into_iter().map(|(_, name)| Cluster {
         bounds: bounds[name as usize],
@@ -127,7 +129,7 @@ fn spread_bits(mut bits: u64) -> u64 {
 
 /// The place of the best partner of each cluster. There are at least two.
 fn partners(clusters: &[Cluster]) -> Vec<usize> {
-    parallel::map(clusters.len(), CHUNK, |place| {
+    let partner = |place: usize| {
         let own = &clusters[place].bounds;
         let first = place.saturating_sub(RADIUS);
         let last = (clusters.len() - 1).min(place + RADIUS);
@@ -140,7 +142,9 @@ fn partners(clusters: &[Cluster]) -> Vec<usize> {
             }
         }
         best.2
-    })
+    };
+    let places = (0..clusters.len()).into_par_iter().with_min_len(CHUNK);
+    places.map(partner).collect()
 }
 
 struct Forest<'a> {
@@ -204,7 +208,7 @@ impl Forest<'_> {
         }
         let [left, right] = merger.children;
         let (left, right) = if merger.count > SEQUENTIAL {
-            parallel::join(|| self.piece(left), || self.piece(right))
+            rayon::join(|| self.piece(left), || self.piece(right))
         } else {
             (self.piece(left), self.piece(right))
         };

@@ -2,14 +2,14 @@
 //!
 //! # Why no part of a triangle is lost
 //!
-//! [`crate::geometry::ray_setup`] shows that a triangle that is hit has a point `P` within `11 u R` of where the ray is
+//! The kernel's `geometry/ray_setup.rs` shows that a triangle that is hit has a point `P` within `11 u R` of where the ray is
 //! at the distance of the hit, and that every widened box with `P` in it is entered at that distance or before, and
 //! left there or later. A split triangle is in several leaves, and the boxes of these hold it all: what lies between
 //! two planes is found in double precision, rounded outwards, and put into a box that is never larger than what the
 //! leaf had before the split. So one of the leaves has a box with `P` in it, and that leaf is visited as the leaf of a
 //! whole triangle would be. A test is of the whole triangle, wherever it is made, and gives the same answer.
 
-use crate::aabb::Aabb;
+use antumbra::Aabb;
 
 /// The box around the part of a triangle between two coordinates on an axis, as far as it is in `bounds`, which is around
 /// some part of it already. Empty if there is nothing.
@@ -107,9 +107,9 @@ mod tests {
         for round in 0..2000 {
             let size = 10f32.powi(rng.below(9) as i32 - 4);
             let offset = rng.point(3.0);
-            let corners: [[f32; 3]; 3] = core::array::from_fn(|_| {
+            let corners: [[f32; 3]; 3] = std::array::from_fn(|_| {
                 let point = rng.point(size);
-                core::array::from_fn(|axis| point[axis] + offset[axis])
+                std::array::from_fn(|axis| point[axis] + offset[axis])
             });
             let whole = Aabb::around(&corners);
             let mut bounds = whole;
@@ -132,7 +132,7 @@ mod tests {
                     (u, v) = (1.0 - u, 1.0 - v);
                 }
                 let [a, b, c] = corners.map(|corner| corner.map(f64::from));
-                let point: [f64; 3] = core::array::from_fn(|axis| {
+                let point: [f64; 3] = std::array::from_fn(|axis| {
                     a[axis] + u * (b[axis] - a[axis]) + v * (c[axis] - a[axis])
                 });
                 let inside = |bounds: &Aabb| {

@@ -2,31 +2,29 @@
 //! primitives in two. A primitive may then be in several leaves, each with a box around its own part only.
 //!
 //! Source: Stich, Friedrich and Dietrich (2009), "Spatial Splits in Bounding Volume Hierarchies", with their
-//! [`ALPHA`] and their reference unsplitting. Triangles are clipped (see [`crate::lab::sbvh::clip`]), spheres cut as boxes.
+//! [`ALPHA`] and their reference unsplitting. Triangles are clipped (see [`crate::builders::sbvh::clip`]), spheres cut as boxes.
 //! Choices made here:
-//! - The contents of a child cost what [`crate::builder::cost`] says, and a node becomes a leaf when it fits a leaf block,
+//! - The contents of a child cost what [`antumbra::parts::SplitCost`] says, and a node becomes a leaf when it fits a leaf block,
 //!   as with the other builders.
-//! - Slivers are not split (see [`crate::lab::sbvh::clip`]).
+//! - Slivers are not split (see [`crate::builders::sbvh::clip`]).
 //! - There are at most twice as many references as primitives, and no more than those in scenes so tiny or huge that
 //!   distances are not to be relied on. Additions are divided among subtrees by
 //!   their sizes, so the tree does not depend on the number of threads.
 
-use alloc::vec::Vec;
 
 pub(crate) mod clip;
 mod spatial_bins;
 
-use crate::aabb::Aabb;
-use crate::builder::cost::Cost;
-use crate::geometry::BLOCK;
-use crate::geometry::primitives::Primitives;
-use crate::geometry::ray_setup::is_sane;
-use crate::lab::candidates::{Candidates, center};
-use crate::lab::pieces::Piece;
-use crate::lab::sbvh::clip::within;
-use crate::lab::sbvh::spatial_bins::{Reference, SpatialSplit, best_plane};
-use crate::parallel;
-use crate::tree::binary::BinaryTree;
+use antumbra::Aabb;
+use antumbra::parts::SplitCost as Cost;
+use antumbra::parts::BLOCK;
+use antumbra::Primitives;
+use antumbra::parts::is_sane;
+use crate::builders::candidates::{Candidates, center};
+use crate::builders::pieces::Piece;
+use crate::builders::sbvh::clip::within;
+use crate::builders::sbvh::spatial_bins::{Reference, SpatialSplit, best_plane};
+use antumbra::parts::BinaryTree;
 
 /// Spatial splits are tried where the two sides of the best object split overlap by more than this share of
 /// the area of the root.
@@ -50,7 +48,7 @@ pub(crate) fn build(primitives: &Primitives) -> BinaryTree {
     });
     let plan = Plan {
         primitives,
-        cost: Cost::new(),
+        cost: Cost::default(),
         least_overlap: primitives.bounds().half_area() * ALPHA,
     };
     // Beyond these lengths distances underflow or overflow, and a hit may be far from where a part is.
@@ -101,7 +99,7 @@ impl Plan<'_> {
         let build_left = |left| self.piece(left, left_budget, depth + 1);
         let build_right = |right| self.piece(right, rest - left_budget, depth + 1);
         let (left, right) = if all > SEQUENTIAL {
-            parallel::join(|| build_left(left), || build_right(right))
+            rayon::join(|| build_left(left), || build_right(right))
         } else {
             (build_left(left), build_right(right))
         };

@@ -1,34 +1,37 @@
-//! The steps of learning as methods of a tree, and queries that count what they do.
+//! The steps of learning one by one, and queries that are observed: for those who make many trees of one geometry and
+//! compare them, and for those who learn from rays while they trace them. [`Build`](super::build::Build) takes all steps in
+//! one call.
 
+use alloc::borrow::Cow;
 use alloc::vec;
-use core::time::Duration;
+use alloc::vec::Vec;
 
 use antumbra_simd::Isa;
 
-use super::oracle::{self, Visits};
-use crate::api::bvh::Bvh;
-use crate::api::recipe::Recipe;
+use super::bvh::Bvh;
+use super::recipe::Recipe;
+use super::stage::Stage;
+use super::times::Stopwatch;
 use crate::builder::{self, Builder};
-use crate::collapse::{Collapse, Learning};
+use crate::collapse::{self, Collapse, Learning};
 use crate::error::Error;
 use crate::geometry::primitives::Primitives;
-use crate::learn::ray_log::RayLog;
+use crate::learn::log::Logging;
 use crate::learn::surface_rays::surface_rays;
 use crate::learn::{Log, LogKind, TreeLog};
-use crate::order::Order;
-use crate::parallel;
+use crate::order::{self, Order};
 use crate::ray::Ray;
-use crate::trace::observe::Cost;
-use crate::trace::pick::Pick;
+use crate::trace::observe::{Cost, Observer};
+use crate::trace::pick::{Pick, Shuffle};
 use crate::tree::binary::BinaryTree;
 use crate::tree::costs::CostModel;
 use crate::tree::slot_order::SlotOrder;
 use crate::tree::width::Width;
 
-/// Steps of learning one by one, for those who compare builders, collapses and orders.
+/// Steps of learning one by one, and queries that count what they do: methods of [`Bvh`] for those who import them.
 ///
-/// [`Bvh::learn`] takes them all in one call.
-pub trait Laboratory: Sized {
+/// [`Bvh::learn`] takes all steps in one call.
+pub trait Steps: Sized {
     /// Collapses a binary tree without rays; children stay in the depth-first order of the binary tree. A collapse
     /// that [needs a log](Collapse::needs_log) goes by areas in place of visits.
     ///
@@ -89,8 +92,9 @@ pub trait Laboratory: Sized {
     /// Traces `rays` in this tree and returns their log. `seed` starts the shuffling of children, for kinds that shuffle.
     fn log_of(&self, rays: &[Ray], kind: LogKind, seed: u64) -> Log;
 
-    /// Puts a tree fresh from its collapse into the order of a recipe, learned from `log` or else from `rays`. Where the
-    /// order learns and there is neither, the tree stays as it is.
+    /// Puts a tree fresh from its collapse into the order of a recipe, learned from `log` or else from `rays`, and has it
+    /// prefetch as the recipe says. Where the
+    /// order learns and there is neither, the tree stays as it is. Returns the log, if one had to be made.
     ///
     /// The [report](Bvh::report) then has the number of rays learned from, and the predicted cost before and after.
     ///
@@ -101,7 +105,7 @@ pub trait Laboratory: Sized {
         rays: &[Ray],
         log: Option<&Log>,
         recipe: &Recipe,
-    ) -> Result<(), Error>;
+    ) -> Result<Option<Log>, Error>;
 
     /// Whether anything lies in the interval of each ray, and what each ray cost; on the calling thread.
     ///
@@ -109,7 +113,7 @@ pub trait Laboratory: Sized {
     /// If the slices differ in length.
     fn occluded_batch_counted(&self, rays: &[Ray], occluded: &mut [bool], costs: &mut [Cost]);
 
-    /// [`Laboratory::occluded_batch_counted`], and the rays are written to `log`, in whose shuffled mode
+    /// [`Steps::occluded_batch_counted`], and the rays are written to `log`, in whose shuffled mode
     /// children are visited in random order.
     ///
     /// # Panics
@@ -121,33 +125,9 @@ pub trait Laboratory: Sized {
         costs: &mut [Cost],
         log: &mut Log,
     );
-
-    /// Nodes that rays visit, counted separately for occluded rays and for the others:
-    /// [`Laboratory::occluded_batch_counted`] summed up, on the threads of the current rayon pool.
-    fn visits(&self, rays: &[Ray]) -> Visits;
-
-    /// Nodes that rays would visit if each went straight to an occluder, by the shortest path to any: what the best
-    /// order of all, made for each single ray, could save. The tree's own order does not matter.
-    ///
-    /// The difference to [`Laboratory::visits`] is the most that any order can still save.
-    fn oracle_visits(&self, rays: &[Ray]) -> Visits;
-
-    /// Has batches prefetch or not: as the recipe says, or else as a short timing of `rays` by its clock decides.
-    fn choose_prefetch(&mut self, rays: &[Ray], recipe: &Recipe);
-
-    /// Has batches prefetch nodes and leaves from now on, or not.
-    fn set_prefetch(&mut self, prefetch: bool);
-
-    /// Times `rays`, as occlusion queries on the calling thread, with and without prefetching of nodes and leaves.
-    /// Keeps what is faster and returns it. `clock` returns the time that has passed since some moment: the kernel has
-    /// no clock.
-    ///
-    /// A few thousand rays like the ones to come are enough. Rays traced for the first time say more than rays that
-    /// were just traced. With fewer than 512 rays, or a clock that does not advance, the setting stays as it is.
-    fn time_prefetch(&mut self, rays: &[Ray], clock: impl Fn() -> Duration) -> bool;
 }
 
-impl Laboratory for Bvh {
+impl Steps for Bvh {
     fn collapse(
         primitives: &Primitives,
         tree: &BinaryTree,
@@ -155,7 +135,20 @@ impl Laboratory for Bvh {
         width: Width,
         isa: Isa,
     ) -> Self {
-        Self::collapse(primitives, tree, collapse, width, isa)
+        tree.assert_is_of(primitives);
+        if collapse == Collapse::Area {
+            let tree = collapse::by_area(primitives, tree, width);
+            return Self::fresh(tree, isa, primitives);
+        }
+        let learning = Learning {
+            collapse,
+            sort: false,
+            ..Default::default()
+        };
+        let log = TreeLog::new(tree);
+        let mut bvh = Self::collapse_logged(primitives, tree, &log, &learning, width, isa);
+        bvh.predicted_cost = None;
+        bvh
     }
 
     fn collapse_logged(
@@ -166,15 +159,21 @@ impl Laboratory for Bvh {
         width: Width,
         isa: Isa,
     ) -> Self {
-        Self::collapse_logged(primitives, tree, log, learning, width, isa)
+        tree.assert_is_of(primitives);
+        log.assert_fits(tree);
+        let (tree, cost) = collapse::by_log(primitives, tree, log, learning, width);
+        Self {
+            predicted_cost: Some(cost),
+            ..Self::fresh(tree, isa, primitives)
+        }
     }
 
     fn new_log(&self, kind: LogKind, seed: u64) -> Log {
-        self.new_log(kind, seed)
+        Log::new(&self.tree, kind, seed)
     }
 
     fn plan(&self, order: Order, log: Option<&Log>, model: &CostModel) -> Result<SlotOrder, Error> {
-        self.plan(order, log, model)
+        order::plan(&self.tree, order, log, model)
     }
 
     fn predicted_cost(
@@ -183,15 +182,23 @@ impl Laboratory for Bvh {
         model: &CostModel,
         order: Option<&SlotOrder>,
     ) -> Result<f64, Error> {
-        self.predicted_cost(log, model, order)
+        order::ratio::predicted_cost(&self.tree, log, model, order)
     }
 
     fn apply(&mut self, order: &SlotOrder) {
-        self.apply(order)
+        if let Err(error) = Error::unless_fits(order.shape, self.shape()) {
+            panic!("{error}");
+        }
+        self.tree.apply(order);
+        self.predicted_cost = None;
     }
 
     fn log_of(&self, rays: &[Ray], kind: LogKind, seed: u64) -> Log {
-        self.log_of(rays, kind, seed)
+        let mut log = self.new_log(kind, seed);
+        let mut occluded = vec![false; rays.len()];
+        let mut costs = vec![Cost::default(); rays.len()];
+        self.occluded_batch_logged(rays, &mut occluded, &mut costs, &mut log);
+        log
     }
 
     fn learn_order(
@@ -199,8 +206,45 @@ impl Laboratory for Bvh {
         rays: &[Ray],
         log: Option<&Log>,
         recipe: &Recipe,
-    ) -> Result<(), Error> {
-        self.learn_order(rays, log, recipe).map(|_| ())
+    ) -> Result<Option<Log>, Error> {
+        let Recipe { order, costs, .. } = recipe;
+        self.prefetch = recipe.prefetch.or(self.prefetch);
+        if *order == Order::Simple {
+            // A fresh tree is in this order.
+            return Ok(None);
+        }
+        let mut stopwatch = Stopwatch::new(recipe.clock);
+        let mut times = self.times.unwrap_or_default();
+        let made = match (order.properties().log, log) {
+            (Some(kind), None) if !rays.is_empty() => {
+                Some(self.log_of(rays, kind, recipe.training.seed))
+            }
+            _ => None,
+        };
+        let log = log.or(made.as_ref());
+        times.order_log += stopwatch.lap();
+        if log.is_none() && order.learns() {
+            return Ok(None);
+        }
+        let plan = self.plan(*order, log, costs)?;
+        times.order += stopwatch.lap();
+        let predicted = match log {
+            Some(log) if !order.picks_by_ray() && log.kind().boxes => Some([
+                self.predicted_cost(log, costs, None)?,
+                self.predicted_cost(log, costs, Some(&plan))?,
+            ]),
+            _ => None,
+        };
+        times.predict += stopwatch.lap();
+        self.apply(&plan);
+        times.order += stopwatch.lap();
+        if let Some([before, after]) = predicted {
+            self.predicted_before = Some(before);
+            self.predicted_cost = Some(after);
+        }
+        self.training_rays = log.map_or(0, Log::rays);
+        self.times = recipe.clock.map(|_| times);
+        Ok(made)
     }
 
     fn occluded_batch_counted(&self, rays: &[Ray], occluded: &mut [bool], costs: &mut [Cost]) {
@@ -216,59 +260,21 @@ impl Laboratory for Bvh {
         costs: &mut [Cost],
         log: &mut Log,
     ) {
-        self.occluded_batch_logged(rays, occluded, costs, log)
+        assert_eq!(rays.len(), costs.len(), "one cost per ray");
+        if let Err(error) = Error::unless_fits(log.shape(), self.shape()) {
+            panic!("{error}");
+        }
+        let pick = if log.kind().shuffled {
+            Pick::Shuffled(Shuffle::new(log.seed()))
+        } else {
+            Pick::Rule
+        };
+        let mut observer = Logging::new(self.counting(costs), log);
+        self.observe(pick, &mut observer, rays, occluded);
+        if let Some(masks) = log.masks_mut() {
+            self.follow(rays, masks);
+        }
     }
-
-    fn visits(&self, rays: &[Ray]) -> Visits {
-        sum_visits(rays, |rays| {
-            let mut occluded = vec![false; rays.len()];
-            let mut costs = vec![Cost::default(); rays.len()];
-            self.occluded_batch_counted(rays, &mut occluded, &mut costs);
-            let mut sum = Visits::default();
-            for (occluded, cost) in occluded.into_iter().zip(costs) {
-                sum.add(occluded, cost.node_tests.into());
-            }
-            sum
-        })
-    }
-
-    fn oracle_visits(&self, rays: &[Ray]) -> Visits {
-        sum_visits(rays, |rays| {
-            let mut log = RayLog::default();
-            self.follow(rays, &mut log);
-            let mut sum = Visits::default();
-            oracle::add_shortest(&self.tree, &log, &mut sum);
-            // Rays that cannot hit anything are not in the log.
-            let all = sum.occluded_rays + sum.unoccluded_rays;
-            sum.unoccluded_rays += rays.len() as u64 - all;
-            sum
-        })
-    }
-
-    fn choose_prefetch(&mut self, rays: &[Ray], recipe: &Recipe) {
-        self.choose_prefetch(rays, recipe)
-    }
-
-    fn set_prefetch(&mut self, prefetch: bool) {
-        self.set_prefetch(prefetch)
-    }
-
-    fn time_prefetch(&mut self, rays: &[Ray], clock: impl Fn() -> Duration) -> bool {
-        self.time_prefetch(rays, clock)
-    }
-}
-
-fn sum_visits(rays: &[Ray], visits: impl Fn(&[Ray]) -> Visits + Sync + Send) -> Visits {
-    /// Visits take memory until they are counted.
-    const CHUNK: usize = 1 << 10;
-    let chunks = parallel::map(rays.len().div_ceil(CHUNK), 1, |chunk| {
-        visits(&rays[chunk * CHUNK..rays.len().min((chunk + 1) * CHUNK)])
-    });
-    let mut sum = Visits::default();
-    for visits in chunks {
-        sum.merge(&visits);
-    }
-    sum
 }
 
 impl BinaryTree {
@@ -289,9 +295,39 @@ impl BinaryTree {
     }
 
     /// Builds a tree for rays like these, all with the same weight, if the builder [needs rays](Builder::needs_rays);
-    /// the others ignore them. Of more than 2¹⁴ rays an even selection is used. Without rays, and where hardly any
-    /// come, the result is the tree of [`Builder::BinnedSah`].
+    /// the others ignore them. Without rays, and where hardly any come, the result is the tree of
+    /// [`Builder::BinnedSah`].
     pub fn build_for(primitives: &Primitives, builder: Builder, rays: &[Ray]) -> Self {
         builder::build(primitives, builder, rays, &())
     }
+}
+
+/// The steps behind a binary tree, one by one.
+impl Stage {
+    /// Binary tree of this stage.
+    pub fn tree(&self) -> &BinaryTree {
+        &self.binary.tree
+    }
+
+    /// Log of the training rays of a recipe in the binary tree.
+    pub fn training_log(&self, rays: &[Ray], recipe: &Recipe) -> Cow<'_, TreeLog> {
+        self.binary.training_log(&self.primitives, rays, recipe)
+    }
+
+    /// Wide tree for the rays of a training log, or without one for areas only. A thorough search for a learned
+    /// collapse takes two starts, which pays for rays that are known.
+    ///
+    /// # Panics
+    /// If the log was made for another tree.
+    pub fn collapse_for(&self, log: Option<&TreeLog>, thorough: bool, recipe: &Recipe) -> Bvh {
+        (self.binary).collapse_for(&self.primitives, log, thorough, recipe)
+    }
+}
+
+/// Occlusion of rays one by one, on the calling thread, while an observer is told what happens. Returns whether anything lies
+/// in the interval of each ray.
+pub fn observe(bvh: &Bvh, rays: &[Ray], observer: &mut dyn Observer) -> Vec<bool> {
+    let mut occluded = vec![false; rays.len()];
+    bvh.observe(Pick::Rule, observer, rays, &mut occluded);
+    occluded
 }
