@@ -1,9 +1,10 @@
-//! `antumbra list`: orders, builders, collapses, levels, presets and widths, from the kernel's lists.
+//! `antumbra list`: orders, builders, collapses, levels, presets and widths.
 
 use std::fmt::Write;
 
-use antumbra::recipe::{Builder, Collapse, Level, Order, Preset};
+use antumbra::recipe::{Level, Preset};
 use antumbra::{Isa, Recipe, Width};
+use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS};
 use clap::ValueEnum;
 use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
@@ -60,10 +61,10 @@ pub fn run(args: &ListArgs) -> Result<(), Failure> {
 
 /// The rows of a list.
 fn entries(list: ListName) -> Vec<Entry> {
-    /// The rows of a list of the kernel.
+    /// The rows of a list.
     macro_rules! rows {
-        ($list:ident, $default:expr) => {
-            $list::ALL.map(|row| Entry {
+        ($list:expr, $default:expr) => {
+            $list.map(|row| Entry {
                 name: row.name(),
                 sentence: row.sentence(),
                 source: row.source(),
@@ -74,12 +75,12 @@ fn entries(list: ListName) -> Vec<Entry> {
     }
     let default = Recipe::default();
     match list {
-        ListName::Orders => rows!(Order, default.order).into(),
-        ListName::Builders => rows!(Builder, default.builder).into(),
-        ListName::Collapses => rows!(Collapse, default.collapse).into(),
+        ListName::Orders => rows!(ORDERS, default.order).into(),
+        ListName::Builders => rows!(BUILDERS, default.builder).into(),
+        ListName::Collapses => rows!(COLLAPSES, default.collapse).into(),
         ListName::Levels => Level::ALL.iter().map(level).collect(),
-        ListName::Presets => rows!(Preset, Preset::default()).into(),
-        ListName::Widths => rows!(Width, default.width).into(),
+        ListName::Presets => rows!(Preset::ALL, Preset::default()).into(),
+        ListName::Widths => rows!(Width::ALL, default.width).into(),
     }
 }
 

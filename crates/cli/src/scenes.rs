@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use antumbra::recipe::Builder;
+use antumbra::recipe::{Builder, Order};
 use antumbra::{BuildMonitor, Isa, Ray, Width};
 use antumbra_image::{Allowance, Raster, Samples};
 use antumbra_lab::count;
@@ -15,6 +15,7 @@ use antumbra_load::{
 };
 use antumbra_render::{Camera, World};
 use antumbra_scene::{Image, Pixels, Projection, Sampler, Scene};
+use antumbra_trees::ORDERS;
 
 use crate::args::{CameraArgs, PictureArgs, PoseArgs};
 use crate::exit::{self, Failure, say, tell};
@@ -45,6 +46,7 @@ fn options(max_memory: MemorySize) -> Options {
         max_memory,
         strict: STRICT.load(Ordering::Relaxed),
         skip_unsupported: SKIP.load(Ordering::Relaxed),
+        orders: ORDERS.map(Order::name).to_vec(),
     }
 }
 

@@ -2,12 +2,13 @@
 
 use std::io::{self, IsTerminal};
 
-use antumbra::recipe::{Builder, Order, Preset};
+use antumbra::recipe::{Order, Preset};
 use antumbra::{Isa, Width};
 use antumbra_lab::RaysFrom;
 use antumbra_lab::study::{self, Plan, Results, Subject, Viewpoint};
 use antumbra_load::{IntegratorKind, MemorySize};
 use antumbra_scene::{Integrator, SamplerKind, Scene};
+use antumbra_trees::{FTOB, ORDERS, PBRT};
 
 use crate::args::{CameraChoice, StudyArgs};
 use crate::exit::{Failure, tell};
@@ -84,7 +85,7 @@ fn plan(args: &StudyArgs, isa: Isa, memory: MemorySize, scenes: Vec<Subject>) ->
         orders: match &args.orders {
             Some(orders) => orders.0.clone(),
             None if as_in_paper => ORDERS_OF_THE_PAPER.to_vec(),
-            None => Order::ALL.to_vec(),
+            None => ORDERS.to_vec(),
         },
         widths: match &args.widths.widths {
             widths if as_in_paper && widths.is_auto() => vec![Width::W4, Width::W8],
@@ -100,7 +101,7 @@ fn plan(args: &StudyArgs, isa: Isa, memory: MemorySize, scenes: Vec<Subject>) ->
         },
         trees: match &args.trees {
             Some(trees) => trees.0.clone(),
-            None if as_in_paper => vec![Builder::Pbrt],
+            None if as_in_paper => vec![PBRT],
             None => vec![recipe.builder],
         },
         collapses: args.collapses.or(&recipe),
@@ -124,7 +125,7 @@ const PRIM_COST_OF_OTHERS: f32 = 1.0;
 /// Orders of the paper's Tables 2 and 3.
 const ORDERS_OF_THE_PAPER: [Order; 6] = [
     Order::Simple,
-    Order::Ftob,
+    FTOB,
     Order::Sato,
     Order::SortMinus,
     Order::Sort,

@@ -11,7 +11,7 @@
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
 
-use antumbra::parts::{Steps, Log, LogKind, TreeLog, surface_rays};
+use antumbra::parts::{Log, LogKind, Steps, TreeLog, surface_rays};
 use antumbra::recipe::{Builder, Order, TrainingRays};
 use antumbra::{Build, Bvh, Ray, Recipe, Stage};
 use antumbra_render::World;

@@ -24,7 +24,7 @@ use crate::up::Upright;
 const BUILTIN: &str = "builtin:";
 
 /// Choices of a caller about loading.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Options {
     /// Memory that the scene may take, its trees included. A larger scene is refused.
     pub max_memory: MemorySize,
@@ -32,6 +32,8 @@ pub struct Options {
     pub strict: bool,
     /// Whether features of `.pbrt` files that are not supported are left out with warnings. Otherwise they are errors.
     pub skip_unsupported: bool,
+    /// Names of child orders that a `.pbrt` file may request.
+    pub orders: Vec<&'static str>,
 }
 
 impl Default for Options {
@@ -41,6 +43,7 @@ impl Default for Options {
             max_memory: MemorySize::of_machine(),
             strict: false,
             skip_unsupported: false,
+            orders: Order::ALL.map(Order::name).to_vec(),
         }
     }
 }
@@ -108,8 +111,7 @@ pub fn load(name: &Path, options: &Options) -> Result<Loaded, Error> {
     let mut loaded = match name.to_str().and_then(|name| name.strip_prefix(BUILTIN)) {
         Some(name) => Loaded::plain(built_in(name)?),
         None if extension(name) == "pbrt" => from_origin(|origin| {
-            let orders = Order::ALL.map(Order::name);
-            let mut loaded = antumbra_pbrt::load(name, &pbrt_options(&orders, options, origin))?;
+            let mut loaded = antumbra_pbrt::load(name, &pbrt_options(options, origin))?;
             loaded.scene.name = stem(name);
             Ok(of_pbrt(loaded))
         })?,
@@ -156,8 +158,7 @@ pub fn load_text(text: Vec<u8>, options: &Options) -> Result<Loaded, Error> {
     let start = Instant::now();
     let name = Path::new("stdin");
     let mut loaded = from_origin(|origin| {
-        let orders = Order::ALL.map(Order::name);
-        let options = pbrt_options(&orders, options, origin);
+        let options = pbrt_options(options, origin);
         Ok(of_pbrt(antumbra_pbrt::parse(text.clone(), name, &options)?))
     })?;
     estimate::check(&loaded.scene, options.max_memory)?;
@@ -291,13 +292,9 @@ fn of_model(path: &Path, mut model: antumbra_mesh::Model) -> Loaded {
     }
 }
 
-fn pbrt_options<'a>(
-    orders: &'a [&'a str],
-    options: &Options,
-    origin: DVec3,
-) -> antumbra_pbrt::Options<'a> {
+fn pbrt_options(options: &Options, origin: DVec3) -> antumbra_pbrt::Options<'_> {
     antumbra_pbrt::Options {
-        orders,
+        orders: &options.orders,
         max_memory: Some(options.max_memory.bytes()),
         origin,
         skip_unsupported: options.skip_unsupported,

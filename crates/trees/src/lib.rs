@@ -20,7 +20,9 @@ mod builders;
 mod collapses;
 mod orders;
 
-pub use builders::{BUILDERS, PBRT, PBRT_2015, PLOC, PLOC_REINSERTION, RDH, SBVH, SRDH, VDBVH, builder};
+pub use builders::{
+    BUILDERS, PBRT, PBRT_2015, PLOC, PLOC_REINSERTION, RDH, SBVH, SRDH, VDBVH, builder,
+};
 pub use collapses::{COLLAPSES, LEARNED_UNSORTED, RSC, collapse};
 pub use orders::oracle::{Visits, oracle_visits, visits};
 pub use orders::{FTOB, ORDERS, RANDOM, RTSAH, order};

@@ -1,10 +1,11 @@
-//! Names of orders, builders, collapses, levels and widths, from the kernel's lists, for help and for parsing.
+//! Names of orders, builders, collapses, levels and widths, for help and for parsing.
 
 use std::error::Error;
 use std::str::FromStr;
 
 use antumbra::Width;
-use antumbra::recipe::{Builder, Collapse, Level, Order, Preset};
+use antumbra::recipe::{Level, Preset, UnknownName};
+use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 /// Stands for what suits the machine.
@@ -12,17 +13,17 @@ pub const AUTO: &str = "auto";
 
 /// Names of all orders.
 pub fn orders() -> Vec<String> {
-    Order::ALL.iter().map(ToString::to_string).collect()
+    ORDERS.iter().map(ToString::to_string).collect()
 }
 
 /// Names of all builders.
 pub fn builders() -> Vec<String> {
-    Builder::ALL.iter().map(ToString::to_string).collect()
+    BUILDERS.iter().map(ToString::to_string).collect()
 }
 
 /// Names of all collapses.
 pub fn collapses() -> Vec<String> {
-    Collapse::ALL.iter().map(ToString::to_string).collect()
+    COLLAPSES.iter().map(ToString::to_string).collect()
 }
 
 /// Names of all presets.
@@ -52,6 +53,15 @@ where
 {
     let names = names.into_iter().map(PossibleValue::new);
     PossibleValuesParser::new(names).try_map(|name| name.parse::<T>())
+}
+
+/// A parser of one of the names of a list of trees.
+pub fn row<T: Clone + Send + Sync + 'static>(
+    names: Vec<String>,
+    find: fn(&str) -> Result<T, UnknownName>,
+) -> impl TypedValueParser<Value = T> {
+    let names = names.into_iter().map(PossibleValue::new);
+    PossibleValuesParser::new(names).try_map(move |name| find(&name))
 }
 
 /// Long help of a flag that takes one of the names.

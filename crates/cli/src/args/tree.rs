@@ -7,7 +7,7 @@ use antumbra_scene::Scene;
 use clap::Args;
 
 use super::heading;
-use super::names::{self, help_list, help_one, one_of};
+use super::names::{self, help_list, help_one, one_of, row};
 use super::values::{Collapses, PrefetchChoice, WidthChoice, Widths};
 
 /// Flags that choose the tree.
@@ -19,7 +19,7 @@ pub struct TreeArgs {
     #[arg(
         long,
         value_name = "O",
-        value_parser = one_of::<Order>(names::orders()),
+        value_parser = row(names::orders(), antumbra_trees::order),
         hide_possible_values = true,
         help = "Child order, see `antumbra list orders`",
         long_help = help_one("Child order of shadow rays", &names::orders(),
@@ -31,7 +31,7 @@ pub struct TreeArgs {
     #[arg(
         long,
         value_name = "C",
-        value_parser = one_of::<Collapse>(names::collapses()),
+        value_parser = row(names::collapses(), antumbra_trees::collapse),
         hide_possible_values = true,
         help = "Collapse of the binary tree",
         long_help = help_one("How the binary tree is made wide", &names::collapses(),
@@ -75,7 +75,7 @@ pub struct BuilderArgs {
     #[arg(
         long,
         value_name = "B",
-        value_parser = one_of::<Builder>(names::builders()),
+        value_parser = row(names::builders(), antumbra_trees::builder),
         hide_possible_values = true,
         help_heading = heading::TREE,
         help = "Builder of the binary tree",
@@ -141,7 +141,10 @@ impl TreeArgs {
         let preset = self.preset.preset.recipe();
         let asked = &scene.accelerator;
         // The reader was given the names of all orders, so that there are no others.
-        let scenes = asked.order.as_deref().and_then(|name| name.parse().ok());
+        let scenes = asked
+            .order
+            .as_deref()
+            .and_then(|name| antumbra_trees::order(name).ok());
         let width = match self.width {
             Some(choice) => choice.on(isa),
             None => asked

@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Duration;
 
-use antumbra::recipe::{Builder, Collapse, Level, Order};
+use antumbra::recipe::{Builder, Collapse, Level, Order, UnknownName};
 use antumbra::{Isa, Width};
 use antumbra_lab::RaysFrom;
 use antumbra_scene::Film;
+use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS};
 use clap::builder::{PathBufValueParser, TypedValueParser};
 
 use crate::exit::Failure;
@@ -193,7 +194,7 @@ impl FromStr for Orders {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        list_or_all(text, &Order::ALL).map(Self)
+        list_or_all(text, &ORDERS, antumbra_trees::order).map(Self)
     }
 }
 
@@ -205,7 +206,7 @@ impl FromStr for Collapses {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        list_or_all(text, &Collapse::ALL).map(Self)
+        list_or_all(text, &COLLAPSES, antumbra_trees::collapse).map(Self)
     }
 }
 
@@ -217,7 +218,7 @@ impl FromStr for Trees {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        list_or_all(text, &Builder::ALL).map(Self)
+        list_or_all(text, &BUILDERS, antumbra_trees::builder).map(Self)
     }
 }
 
@@ -379,18 +380,17 @@ fn each_once<T: PartialEq>(items: impl Iterator<Item = T>) -> Vec<T> {
 }
 
 /// [`list`] of names, or every one there is for `all`.
-fn list_or_all<T>(text: &str, all: &[T]) -> Result<Vec<T>, String>
-where
-    T: FromStr<Err: std::fmt::Display> + Copy + PartialEq,
-{
+fn list_or_all<T: Copy + PartialEq>(
+    text: &str,
+    all: &[T],
+    find: fn(&str) -> Result<T, UnknownName>,
+) -> Result<Vec<T>, String> {
     if text == "all" {
         return Ok(all.to_vec());
     }
-    let parse = |name: &str| {
-        name.parse()
-            .map_err(|error: T::Err| format!("{error}; or all"))
-    };
-    list(text, parse)
+    list(text, |name| {
+        find(name).map_err(|error| format!("{error}; or all"))
+    })
 }
 
 /// The parts of a list separated by commas; an error names the part that occurs twice.
@@ -439,7 +439,7 @@ mod tests {
 
     #[test]
     fn lists_hold_each_item_once() {
-        assert_eq!("all".parse(), Ok(Orders(Order::ALL.to_vec())));
+        assert_eq!("all".parse(), Ok(Orders(ORDERS.to_vec())));
         assert_eq!(
             "sort-,sort+".parse(),
             Ok(Orders(vec![Order::SortMinus, Order::SortPlus]))
@@ -448,7 +448,7 @@ mod tests {
             assert!(bad.parse::<Orders>().is_err(), "{bad}");
             assert!(bad.parse::<Collapses>().is_err(), "{bad}");
         }
-        assert_eq!("all".parse(), Ok(Collapses(Collapse::ALL.to_vec())));
+        assert_eq!("all".parse(), Ok(Collapses(COLLAPSES.to_vec())));
         let collapses = vec![Collapse::Learned, Collapse::Area];
         assert_eq!("learned,area".parse(), Ok(Collapses(collapses)));
         for bad in ["", "5", "4,4", "4;8"] {

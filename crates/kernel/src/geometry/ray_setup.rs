@@ -80,8 +80,8 @@ use core::ops::Deref;
 
 use antumbra_simd::{Lanes, Mask, Scalar, Simd, Width};
 
-use crate::geometry::slab_test::hits_box;
 use crate::aabb::Aabb;
+use crate::geometry::slab_test::hits_box;
 use crate::geometry::slab_test::{One, value, widened_offsets};
 use crate::geometry::triangle_hit::ShearedRay;
 use crate::ray::{INVALID_ID, Ray};

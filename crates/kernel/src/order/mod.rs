@@ -168,12 +168,7 @@ pub trait Plan: Row {
     ///
     /// # Errors
     /// What the log lacks.
-    fn plan(
-        &self,
-        tree: &Tree,
-        log: Option<&Log>,
-        costs: &CostModel,
-    ) -> Result<SlotOrder, Error>;
+    fn plan(&self, tree: &Tree, log: Option<&Log>, costs: &CostModel) -> Result<SlotOrder, Error>;
 
     /// Whether [`Plan::sort_for_ray`] is called in every node. Occlusion queries then go ray by ray, and trees are saved
     /// without it.

@@ -228,7 +228,10 @@ impl NodeRef<'_> {
     }
 
     /// How many slots are occupied; they come first.
-    #[allow(clippy::len_without_is_empty, reason = "only the root of an empty tree is empty")]
+    #[allow(
+        clippy::len_without_is_empty,
+        reason = "only the root of an empty tree is empty"
+    )]
     pub fn len(&self) -> usize {
         let occupied = |child: &&u32| **child != Child::EMPTY.0;
         self.children.iter().rev().take_while(occupied).count()

@@ -60,7 +60,11 @@ impl SlotOrder {
             *slot = from(place) as u8;
             found |= 1_u32.checked_shl(u32::from(*slot)).unwrap_or(0);
         }
-        assert_eq!(found, (1 << self.shape.width) - 1, "a permutation of the slots");
+        assert_eq!(
+            found,
+            (1 << self.shape.width) - 1,
+            "a permutation of the slots"
+        );
         self.set(node, &slots);
     }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity, Pattern, QueryKind};
-use antumbra::parts::{BinaryTree, Steps, Learning, LogKind, TreeLog};
+use antumbra::parts::{BinaryTree, Learning, LogKind, Steps, TreeLog};
 use antumbra::recipe::{Builder, Collapse};
 use antumbra::{Brute, Bvh, Geometry, Instance, Isa, Primitives, Ray, Sphere, Width};
 use antumbra_testkit::{Mesh, Rng, mesh, rays};

@@ -4,7 +4,7 @@ use crate::support::{
     Odd, builders_and_collapses, builders_and_widths, for_every_tree, geometry, kernel_rays, quads,
 };
 use crate::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
-use antumbra::parts::{BinaryTree, Steps, Learning, TreeLog, surface_rays};
+use antumbra::parts::{BinaryTree, Learning, Steps, TreeLog, surface_rays};
 use antumbra::recipe::{Builder, Collapse};
 use antumbra::{
     Brute, Bvh, Error, Geometry, Hit, INVALID_ID, Instance, Isa, Primitives, Ray, Recipe, Sphere,

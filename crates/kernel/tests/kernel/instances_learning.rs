@@ -2,7 +2,7 @@
 
 use crate::support::{geometry, kernel_rays};
 use crate::transforms::{IDENTITY, product, rotation, scale, translation};
-use antumbra::parts::{BinaryTree, Cost, Steps, Learning, TreeLog, surface_rays};
+use antumbra::parts::{BinaryTree, Cost, Learning, Steps, TreeLog, surface_rays};
 use antumbra::recipe::{Builder, Collapse, CostModel, Order};
 use antumbra::{Bvh, Error, Geometry, Instance, Isa, Primitives, Ray, Recipe, Width};
 use antumbra_testkit::{Rng, mesh, rays};

@@ -2,7 +2,7 @@
 //! when the log is mixed.
 
 use crate::support::{builders_and_collapses, geometry, kernel_rays};
-use antumbra::parts::{BinaryTree, Cost, Steps, Learning, TreeLog, surface_rays};
+use antumbra::parts::{BinaryTree, Cost, Learning, Steps, TreeLog, surface_rays};
 use antumbra::recipe::{Builder, Collapse, CostModel, Order};
 use antumbra::{Brute, Bvh, Geometry, Isa, Primitives, Ray, Recipe, Sphere, Width};
 use antumbra_testkit::{Mesh, Rng, mesh, rays};

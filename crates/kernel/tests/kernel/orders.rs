@@ -3,7 +3,7 @@
 use std::panic::AssertUnwindSafe;
 
 use crate::support::geometry;
-use antumbra::parts::{Cost, Steps, Log, LogKind, Visits};
+use antumbra::parts::{Cost, Log, LogKind, Steps, Visits};
 use antumbra::recipe::{Collapse, CostModel, Order};
 use antumbra::{Bvh, Error, Isa, Ray, Recipe, Width};
 use antumbra_testkit::{Mesh, Rng, mesh};

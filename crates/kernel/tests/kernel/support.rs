@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity};
-use antumbra::parts::{BinaryTree, Steps, Learning, TreeLog};
+use antumbra::parts::{BinaryTree, Learning, Steps, TreeLog};
 use antumbra::recipe::{Builder, Collapse, Order, Preset};
 use antumbra::{
     Aabb, Brute, Build, Bvh, Geometry, Hit, Isa, Primitives, Ray, Recipe, UserGeometry, UserHit,

@@ -32,6 +32,7 @@ use antumbra::recipe::{Builder, Collapse, Order};
 use antumbra::{Brute, Isa, Primitives, Ray, Recipe, Width};
 use antumbra_render::Lowered;
 use antumbra_scene::Scene;
+use antumbra_trees::BUILDERS;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::still::still_world;
@@ -99,7 +100,7 @@ impl Default for Options {
             collapses: vec![recipe.collapse],
             widths: vec![None],
             builder: recipe.builder,
-            builds: Builder::ALL.to_vec(),
+            builds: BUILDERS.to_vec(),
             kinds: false,
             prefetch: None,
             isas: vec![Isa::best()],

@@ -3,7 +3,7 @@
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use antumbra::parts::{Cost, Steps, Log};
+use antumbra::parts::{Cost, Log, Steps};
 use antumbra::recipe::{Builder, Collapse};
 use antumbra::{Bvh, Ray, Recipe, Stage, Width};
 use antumbra_render::{

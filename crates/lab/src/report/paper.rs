@@ -1,6 +1,7 @@
 //! The figures of the paper, beside which ours are set.
 
 use antumbra::recipe::Order;
+use antumbra_trees::FTOB;
 use serde::Deserialize;
 
 use crate::Error;
@@ -146,7 +147,7 @@ impl Figures {
     /// Whether the line is about this scene of the paper, width and order.
     pub fn is_of(&self, scene: &str, width: usize, order: &str) -> bool {
         let technique = match order {
-            _ if order == Order::Ftob.name() => "FtoB",
+            _ if order == FTOB.name() => "FtoB",
             _ if order == Order::Sato.name() => "SATO",
             _ if order == Order::Simple.name() => "Simple",
             _ if order == Order::SortMinus.name() => "Sort-",

@@ -125,7 +125,7 @@ pub fn wipe(
 
 /// The order of a row, with C_p where the study has several.
 pub fn order_name(plan: &Plan, row: &Row) -> String {
-    let learns = row.order.parse().is_ok_and(Order::learns);
+    let learns = antumbra_trees::order(&row.order).is_ok_and(Order::learns);
     match plan.more_prim_costs.is_empty() || !learns {
         true => row.order.clone(),
         false => format!("{}, C_p {}", row.order, row.prim_cost),

@@ -1,6 +1,7 @@
 //! Means over scenes: what a study comes to.
 
 use antumbra::recipe::{Builder, Collapse, CostModel, Order};
+use antumbra_trees::{LEARNED_UNSORTED, RTSAH};
 
 use super::blocks::{Measured, words};
 use crate::study::{By, Combination, Kind, Part, Plan, Row};
@@ -135,9 +136,9 @@ impl Summary {
                 let mut widths = self.widths.iter();
                 Some(Combination {
                     width: *widths.find(|width| width.lanes() == row.width)?,
-                    tree: row.tree.parse().ok()?,
-                    collapse: row.collapse.parse().ok()?,
-                    order: row.order.parse().ok()?,
+                    tree: antumbra_trees::builder(&row.tree).ok()?,
+                    collapse: antumbra_trees::collapse(&row.collapse).ok()?,
+                    order: antumbra_trees::order(&row.order).ok()?,
                     prim_cost: None,
                 })
             };
@@ -268,7 +269,7 @@ impl Summary {
             ..paper
         };
         let unsorted = Combination {
-            collapse: Collapse::LearnedUnsorted,
+            collapse: LEARNED_UNSORTED,
             ..built
         };
         let collapsed = Combination {
@@ -419,7 +420,7 @@ impl Summary {
 }
 
 /// Static orders that need no rays, and are more than an arbitrary beginning.
-const FREE_ORDERS: [Order; 3] = [Order::Embree, Order::Sato, Order::Rtsah];
+const FREE_ORDERS: [Order; 3] = [Order::Embree, Order::Sato, RTSAH];
 
 /// A combination in words.
 fn named(combination: &Combination) -> String {

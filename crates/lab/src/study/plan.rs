@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use antumbra::recipe::{Builder, Collapse, CostModel, Order};
 use antumbra::{Isa, Width};
 use antumbra_scene::{Camera, Scene};
+use antumbra_trees::ORDERS;
 
 use super::kinds::{Kind, Part, Trained};
 use super::log_size::LogSize;
@@ -58,7 +59,7 @@ impl Default for Plan {
         let isa = Isa::best();
         Self {
             scenes: Vec::new(),
-            orders: Order::ALL.to_vec(),
+            orders: ORDERS.to_vec(),
             widths: vec![Width::auto(isa.level())],
             trees: vec![Builder::default()],
             collapses: vec![Collapse::default()],
@@ -413,6 +414,7 @@ fn base_of<T: Copy + Default + PartialEq>(list: &[T]) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use antumbra_trees::{BUILDERS, COLLAPSES};
     use antumbra_scene::builtin;
     use std::collections::HashSet;
 
@@ -428,8 +430,8 @@ mod tests {
         let width = Width::W8;
         let plan = Plan {
             widths: vec![width],
-            trees: Builder::ALL.to_vec(),
-            collapses: Collapse::ALL.to_vec(),
+            trees: BUILDERS.to_vec(),
+            collapses: COLLAPSES.to_vec(),
             repeat: 1,
             ..Plan::default()
         };
@@ -467,10 +469,10 @@ mod tests {
         };
         let plan = Plan {
             scenes: vec![subject("a"), subject("b")],
-            orders: Order::ALL.to_vec(),
+            orders: ORDERS.to_vec(),
             widths: Width::ALL.to_vec(),
-            trees: Builder::ALL.to_vec(),
-            collapses: Collapse::ALL.to_vec(),
+            trees: BUILDERS.to_vec(),
+            collapses: COLLAPSES.to_vec(),
             repeat: 2,
             replay: 100,
             rays_from: RaysFrom::Both,
@@ -479,9 +481,9 @@ mod tests {
         let mut keys = HashSet::new();
         for subject in &plan.scenes {
             let compared = plan.compared();
-            let trees = Builder::ALL.len() * Collapse::ALL.len();
+            let trees = BUILDERS.len() * COLLAPSES.len();
             // And the paper's tree, unsorted.
-            let pictures = Order::ALL.len() + trees;
+            let pictures = ORDERS.len() + trees;
             assert_eq!(compared.len(), 3 * pictures);
             // Two whole pictures of each width, twice.
             let whole = plan.renderings();
@@ -495,7 +497,7 @@ mod tests {
             renderings.extend(whole);
             let replays = plan.replays(subject, 5000);
             let main = replays.iter().filter(|r| r.part == Part::Techniques);
-            assert_eq!(main.count(), 2 * 3 * trees * Order::ALL.len());
+            assert_eq!(main.count(), 2 * 3 * trees * ORDERS.len());
             for rendering in renderings {
                 assert!(keys.insert(rendering.key(subject)));
             }

@@ -5,10 +5,11 @@
 //! turn with one and the same tree, by which they can be compared with each other although they were timed at
 //! different moments.
 
-use antumbra::parts::{Cost, Steps};
+use antumbra::parts::Cost;
 use antumbra::{Bvh, Isa, Ray, Recipe, Width};
 use antumbra_render::World;
 use antumbra_scene::Camera;
+use antumbra_trees::oracle_visits;
 
 use super::cameras;
 use super::kinds::{Kind, Trained};
@@ -203,7 +204,7 @@ impl<'a> Bench<'a> {
             // The oracle of a tree is the same for all its orders, which follow each other.
             Some((of, oracle)) if replay.shares_collapse(&of) && replay.shares_tree(&of) => oracle,
             _ => {
-                let visits = collapsed.bvh().oracle_visits(rays);
+                let visits = oracle_visits(collapsed.bvh(), rays);
                 [
                     (visits.occluded_rays > 0).then(|| visits.occluded()),
                     (visits.unoccluded_rays > 0).then(|| visits.unoccluded()),

@@ -28,8 +28,8 @@ fn recipes() -> Vec<Recipe> {
         Recipe::default().order(Order::Simple),
         Recipe::default(),
         Recipe::default().order(Order::Sort).width(Width::W4),
-        Recipe::default().builder(Builder::Srdh),
-        area.builder(Builder::Srdh).order(Order::SortMinus),
+        Recipe::default().builder(antumbra_trees::SRDH),
+        area.builder(antumbra_trees::SRDH).order(Order::SortMinus),
     ]
 }
 

@@ -1,5 +1,7 @@
 //! A tree that many pictures of one world are traced in, and what it learns between them.
 
+use std::sync::Arc;
+
 use antumbra::{Build, Bvh, Recipe};
 
 use super::Task;
@@ -38,11 +40,9 @@ impl KeptTree {
     pub fn learned(world: &World, recipe: &Recipe, lesson: &Lesson) -> Result<Self, Error> {
         let recipe = recipe.clock(Some(clock));
         let rays = lesson.rays();
-        let own;
         let stage = if recipe.builder.needs_rays() && !rays.is_empty() {
             let build = Build::new(&world.primitives).rays(rays).recipe(&recipe);
-            own = build.stage().map_err(Error::of_build)?;
-            &own
+            Arc::new(build.stage().map_err(Error::of_build)?)
         } else {
             world.stage(recipe.builder)
         };

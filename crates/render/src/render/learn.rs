@@ -10,7 +10,7 @@
 
 use std::time::{Duration, Instant};
 
-use antumbra::parts::{Steps, Log};
+use antumbra::parts::{Log, Steps};
 use antumbra::recipe::Builder;
 use antumbra::{Build, BuildMonitor, Bvh, Ray, Recipe, Stage};
 use antumbra_scene::Integrator;
@@ -224,7 +224,7 @@ pub fn make_anew(
         };
         collapse(&kept.insert((recipe.builder, stage)).1)?
     } else {
-        collapse(world.stage_monitored(recipe.builder, watched)?)?
+        collapse(&*world.stage_monitored(recipe.builder, watched)?)?
     };
     Ok(true)
 }

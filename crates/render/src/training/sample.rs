@@ -1,7 +1,7 @@
 //! Training sample: shadow rays of the pre-pass, or their log, as threads keep them for a child order, a collapse or
 //! a builder to learn from.
 
-use antumbra::parts::{Cost, Steps, Log};
+use antumbra::parts::{Cost, Log, Steps};
 use antumbra::{Bvh, Ray};
 
 use crate::sampler::mix;

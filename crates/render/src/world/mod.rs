@@ -11,7 +11,7 @@ mod geometry;
 mod lens;
 
 use std::ops::Deref;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use antumbra::recipe::{Builder, Collapse};
@@ -61,8 +61,8 @@ pub struct Contents {
     pub(crate) primitives: Arc<Primitives>,
     motion: Option<Motion>,
     builder: Builder,
-    /// Trees by place in [`Builder::ALL`], built on first use.
-    stages: [OnceLock<Stage>; Builder::ALL.len()],
+    /// Binary trees by their builders, built on first use.
+    stages: Mutex<Vec<(Builder, Arc<Stage>)>>,
     triangles: usize,
     lower_time: Duration,
 }
@@ -144,7 +144,7 @@ impl World {
             primitives: Arc::new(primitives),
             motion,
             builder,
-            stages: Default::default(),
+            stages: Mutex::default(),
             triangles: scene.triangle_count(),
             lower_time: start.elapsed(),
         };
@@ -209,7 +209,7 @@ impl World {
 
     /// Binary tree of a builder, for surface rays if the builder needs rays. Built on first use, in the current
     /// rayon pool, and kept.
-    pub(crate) fn stage(&self, builder: Builder) -> &Stage {
+    pub(crate) fn stage(&self, builder: Builder) -> Arc<Stage> {
         self.stage_monitored(builder, &()).expect("nobody stops it")
     }
 
@@ -218,20 +218,28 @@ impl World {
         &self,
         builder: Builder,
         monitor: &dyn BuildMonitor,
-    ) -> Result<&Stage, Error> {
-        let place = Builder::ALL.iter().position(|other| *other == builder);
-        let kept = &self.stages[place.expect("`ALL` has them all")];
-        if let Some(stage) = kept.get() {
+    ) -> Result<Arc<Stage>, Error> {
+        let kept = |add: Option<Arc<Stage>>| {
+            let mut stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
+            let found = stages.iter().find(|(other, _)| *other == builder);
+            let found = found.map(|(_, stage)| Arc::clone(stage)).or(add)?;
+            if !stages.iter().any(|(other, _)| *other == builder) {
+                stages.push((builder, Arc::clone(&found)));
+            }
+            Some(found)
+        };
+        if let Some(stage) = kept(None) {
             return Ok(stage);
         }
         let recipe = Recipe::default().builder(builder).clock(Some(clock));
-        // Built inside `get_or_init`, the tree could wait for itself: its thread may take up another task of the pool
-        // in the meantime.
+        // Built while the list is locked, the tree could wait for itself: its thread may take up another task of the
+        // pool in the meantime.
         let build = Build::new(&self.primitives)
             .recipe(&recipe)
             .monitor(monitor);
         let stage = build.stage().map_err(Error::of_build)?;
-        Ok(kept.get_or_init(|| stage))
+        let stage = Arc::new(stage);
+        Ok(kept(Some(Arc::clone(&stage))).unwrap_or(stage))
     }
 
     /// Triangles of all meshes, light shapes included, and of objects once for every instance.

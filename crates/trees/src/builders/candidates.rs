@@ -1,7 +1,6 @@
 //! All object splits, for builders that compare them with others or count rays for each: along each axis, between any
 //! two of a few items or between bins of many.
 
-
 use antumbra::Aabb;
 
 /// Bins per axis. No more items than that are split between any two of them.

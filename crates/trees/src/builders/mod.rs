@@ -129,7 +129,9 @@ impl Grow for Rdh {
     fn grow(&self, primitives: &Primitives, rays: &[Ray]) -> Vec<BinaryTree> {
         let all = AllEvidence::new(primitives, rays);
         let cost = RdhCost::default();
-        each(primitives, |one, place| ray_driven::build(one, all.of(place), &cost))
+        each(primitives, |one, place| {
+            ray_driven::build(one, all.of(place), &cost)
+        })
     }
 }
 
@@ -141,7 +143,9 @@ impl Grow for Srdh {
     fn grow(&self, primitives: &Primitives, rays: &[Ray]) -> Vec<BinaryTree> {
         let all = AllEvidence::new(primitives, rays);
         let cost = SrdhCost::default();
-        each(primitives, |one, place| ray_driven::build(one, all.of(place), &cost))
+        each(primitives, |one, place| {
+            ray_driven::build(one, all.of(place), &cost)
+        })
     }
 }
 
@@ -152,6 +156,8 @@ impl Grow for Vdbvh {
 
     fn grow(&self, primitives: &Primitives, rays: &[Ray]) -> Vec<BinaryTree> {
         let seen = Seen::new(primitives, rays);
-        each(primitives, |one, place| vdbvh::build(one, seen.of(place), vdbvh::WEIGHT))
+        each(primitives, |one, place| {
+            vdbvh::build(one, seen.of(place), vdbvh::WEIGHT)
+        })
     }
 }

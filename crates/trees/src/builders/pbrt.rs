@@ -5,13 +5,12 @@
 //! of the centres (Pharr, Jakob and Humphreys 2016, section 4.3.2). How small leaves are changed in November 2015, and
 //! the paper does not say from which state of pbrt-v3 it started. Both [rules](Rule) are here.
 
-
-use antumbra::Aabb;
-use antumbra::parts::binned_subtree;
-use antumbra::Primitives;
 use crate::builders::candidates::center;
 use crate::builders::pieces::Piece;
+use antumbra::Aabb;
+use antumbra::Primitives;
 use antumbra::parts::BinaryTree;
+use antumbra::parts::binned_subtree;
 
 /// Buckets along the axis.
 const BUCKETS: usize = 12;

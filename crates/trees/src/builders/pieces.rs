@@ -1,6 +1,5 @@
 //! Subtrees put together from below, for builders that make no more of it than that.
 
-
 use antumbra::Aabb;
 use antumbra::parts::{BinaryKind, BinaryNode, BinaryTree};
 

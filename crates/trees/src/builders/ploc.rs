@@ -10,14 +10,13 @@
 //! - Theirs chooses by the surface area heuristic which subtrees become leaves. Here it is all that fit a leaf
 //!   block, which is tested at one go.
 
-
-use antumbra::Aabb;
-use antumbra::parts::BLOCK;
-use antumbra::Primitives;
-use antumbra::parts::PrimKind;
 use crate::builders::pieces::Piece;
-use rayon::prelude::*;
+use antumbra::Aabb;
+use antumbra::Primitives;
+use antumbra::parts::BLOCK;
 use antumbra::parts::BinaryTree;
+use antumbra::parts::PrimKind;
+use rayon::prelude::*;
 
 /// How far a cluster looks in either direction; their quality setting.
 const RADIUS: usize = 16;

@@ -132,7 +132,10 @@ impl Observer for Paths {
 
     fn occluder(&mut self, _: usize, _: usize, from: Place) {
         let length = self.lengths[from.visit as usize];
-        self.shortest = Some(self.shortest.map_or(length, |shortest| shortest.min(length)));
+        self.shortest = Some(
+            self.shortest
+                .map_or(length, |shortest| shortest.min(length)),
+        );
     }
 
     fn end(&mut self) {

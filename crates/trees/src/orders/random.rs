@@ -81,7 +81,10 @@ mod tests {
         let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
         let recipe = Recipe::default().collapse(Collapse::Area).width(Width::W4);
         let recipe = recipe.order(Order::Other(&SEEN));
-        Build::new(&geometry).recipe(&recipe).bvh().expect("indices in range");
+        Build::new(&geometry)
+            .recipe(&recipe)
+            .bvh()
+            .expect("indices in range");
         let (order, lens) = SEEN.0.lock().expect("alone").take().expect("planned");
         let mut counts = [[0u32; 4]; 4];
         let mut full = 0;

@@ -1,6 +1,6 @@
 //! Orders and logs in files.
 
-use antumbra::parts::{Steps, Log, SlotOrder};
+use antumbra::parts::{Log, SlotOrder, Steps};
 use antumbra::recipe::Order;
 use antumbra::{Bvh, Recipe, Width};
 use antumbra_testkit::Rng;

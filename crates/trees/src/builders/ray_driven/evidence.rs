@@ -3,14 +3,13 @@
 //! The rays are followed to their ends through a tree of binned SAH, so every primitive that they hit is
 //! known, not only the nearest. An object has the rays of all its instances.
 
-
-use antumbra::recipe::Builder;
 use antumbra::Primitives;
-use antumbra::parts::RaySetup;
-use rayon::prelude::*;
 use antumbra::Ray;
-use antumbra::parts::{LeafHits, Witness, follow};
 use antumbra::parts::BinaryTree;
+use antumbra::parts::RaySetup;
+use antumbra::parts::{LeafHits, Witness, follow};
+use antumbra::recipe::Builder;
+use rayon::prelude::*;
 
 /// At most this many rays are used. Of more rays, every second, third, ... is used.
 const MOST_RAYS: usize = 1 << 14;
@@ -65,7 +64,9 @@ impl AllEvidence {
 
     /// The rays of the world, or of an object, which are number 1 and up.
     pub fn of(&self, place: usize) -> &Evidence {
-        place.checked_sub(1).map_or(&self.world, |object| &self.objects[object])
+        place
+            .checked_sub(1)
+            .map_or(&self.world, |object| &self.objects[object])
     }
 
     /// No rays.

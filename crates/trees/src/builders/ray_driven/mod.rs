@@ -5,21 +5,20 @@
 //! judged by exact counts of both on its two sides. Where fewer than [`MIN_RAYS`] rays come there is nothing to be
 //! learned, and binned SAH goes on; without rays the tree is the tree of binned SAH.
 
-
 pub(crate) mod evidence;
 pub(crate) mod rdh;
 pub(crate) mod seen;
 pub(crate) mod srdh;
 pub(crate) mod vdbvh;
 
-use antumbra::Aabb;
-use antumbra::parts::binned_subtree;
-use antumbra::Primitives;
-use antumbra::parts::BLOCK;
 use crate::builders::candidates::Candidates;
 use crate::builders::pieces::Piece;
 use crate::builders::ray_driven::evidence::Evidence;
+use antumbra::Aabb;
+use antumbra::Primitives;
+use antumbra::parts::BLOCK;
 use antumbra::parts::BinaryTree;
+use antumbra::parts::binned_subtree;
 
 /// Nodes that fewer rays enter are split by areas.
 const MIN_RAYS: usize = 4;
@@ -253,9 +252,7 @@ impl<C: SplitCost> Plan<'_, C> {
             let ray = &self.evidence.rays[*ray as usize];
             // The boxes on one side of ever later splits hold each other, so a search finds the first that is
             // entered.
-            let first = first_true(1, len, |split| {
-                ray.hits_box(&candidates.left[split].bounds)
-            });
+            let first = first_true(1, len, |split| ray.hits_box(&candidates.left[split].bounds));
             if let Some(side) = sides.get_mut(first) {
                 side[0].entered += 1;
             }

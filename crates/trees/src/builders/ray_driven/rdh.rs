@@ -6,8 +6,8 @@
 //! evidence, `w = R / (R + PRIOR)`, as if [`PRIOR`] more rays had entered boxes by their areas; and what is in a
 //! child costs what [`antumbra::parts::SplitCost`] says instead of its number.
 
-use antumbra::parts::SplitCost as Cost;
 use crate::builders::ray_driven::{Measure, SplitCost};
+use antumbra::parts::SplitCost as Cost;
 
 /// Weight of the areas, in rays.
 const PRIOR: f64 = 16.0;

@@ -3,15 +3,14 @@
 //! Training rays are few, and most primitives of a large scene are on none of them. So every start sends further rays,
 //! into random directions of the half space of its training ray, until more of them find hardly anything new.
 
-
-use antumbra::recipe::Builder;
 use antumbra::Primitives;
-use antumbra::parts::RaySetup;
-use antumbra::parts::Random;
-use rayon::prelude::*;
 use antumbra::Ray;
-use antumbra::parts::{LeafHits, Witness, follow};
 use antumbra::parts::BinaryTree;
+use antumbra::parts::Random;
+use antumbra::parts::RaySetup;
+use antumbra::parts::{LeafHits, Witness, follow};
+use antumbra::recipe::Builder;
+use rayon::prelude::*;
 
 /// Rays of the first round. Every further round has as many as all rounds before it.
 const FIRST: usize = 1 << 14;
@@ -64,7 +63,9 @@ impl Seen {
 
     /// Primitives of the world, or of an object, which are number 1 and up.
     pub fn of(&self, place: usize) -> &[bool] {
-        place.checked_sub(1).map_or(&self.world, |object| &self.objects[object])
+        place
+            .checked_sub(1)
+            .map_or(&self.world, |object| &self.objects[object])
     }
 
     /// Nothing is seen.

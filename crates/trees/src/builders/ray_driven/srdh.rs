@@ -19,9 +19,9 @@
 //! - Chances are blended with areas as in [`crate::builders::ray_driven::rdh`]; the imaginary rays hit nothing.
 //! - Their tree is a second one, only for shadow rays. Ours serves any query, since answers are the same.
 
-use antumbra::parts::SplitCost as Cost;
 use crate::builders::ray_driven::rdh::{blended, chance};
 use crate::builders::ray_driven::{Measure, SplitCost};
+use antumbra::parts::SplitCost as Cost;
 
 /// The cost.
 #[derive(Default)]

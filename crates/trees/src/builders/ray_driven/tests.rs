@@ -1,18 +1,17 @@
 //! Counts against counting; costs against the models they come from.
 
-
-use antumbra::recipe::Builder;
-use antumbra::parts::SplitCost as Cost;
-use antumbra::parts::RaySetup;
-use crate::geometry::test_primitives::primitives;
-use antumbra::{Geometry, Instance};
 use crate::builders::ray_driven::evidence::AllEvidence;
 use crate::builders::ray_driven::rdh::Rdh;
 use crate::builders::ray_driven::seen::Seen;
 use crate::builders::ray_driven::srdh::Srdh;
 use crate::builders::ray_driven::*;
-use antumbra::parts::surface_rays;
+use crate::geometry::test_primitives::primitives;
 use antumbra::Ray;
+use antumbra::parts::RaySetup;
+use antumbra::parts::SplitCost as Cost;
+use antumbra::parts::surface_rays;
+use antumbra::recipe::Builder;
+use antumbra::{Geometry, Instance};
 use antumbra_testkit::{Rng, mesh};
 
 /// Everything a side of a split is said to have is counted again, ray by ray and primitive by primitive.

@@ -8,16 +8,15 @@
 //! - The contents of a child cost what [`antumbra::parts::SplitCost`] says, for all primitives, seen or not.
 //! - Nodes in which nothing is seen are divided as finely as the others: answers need no visibility.
 
-
 use super::{MAX_DEPTH, SEQUENTIAL, area};
-use antumbra::Aabb;
-use antumbra::parts::binned_subtree;
-use antumbra::parts::SplitCost as Cost;
-use antumbra::parts::BLOCK;
-use antumbra::Primitives;
 use crate::builders::candidates::{Candidates, Part};
 use crate::builders::pieces::Piece;
+use antumbra::Aabb;
+use antumbra::Primitives;
+use antumbra::parts::BLOCK;
 use antumbra::parts::BinaryTree;
+use antumbra::parts::SplitCost as Cost;
+use antumbra::parts::binned_subtree;
 
 /// Weight of visibility against area.
 pub(crate) const WEIGHT: f64 = 0.9;

@@ -11,20 +11,19 @@
 //!   distances are not to be relied on. Additions are divided among subtrees by
 //!   their sizes, so the tree does not depend on the number of threads.
 
-
 pub(crate) mod clip;
 mod spatial_bins;
 
-use antumbra::Aabb;
-use antumbra::parts::SplitCost as Cost;
-use antumbra::parts::BLOCK;
-use antumbra::Primitives;
-use antumbra::parts::is_sane;
 use crate::builders::candidates::{Candidates, center};
 use crate::builders::pieces::Piece;
 use crate::builders::sbvh::clip::within;
 use crate::builders::sbvh::spatial_bins::{Reference, SpatialSplit, best_plane};
+use antumbra::Aabb;
+use antumbra::Primitives;
+use antumbra::parts::BLOCK;
 use antumbra::parts::BinaryTree;
+use antumbra::parts::SplitCost as Cost;
+use antumbra::parts::is_sane;
 
 /// Spatial splits are tried where the two sides of the best object split overlap by more than this share of
 /// the area of the root.

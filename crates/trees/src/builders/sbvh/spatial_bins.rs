@@ -3,10 +3,10 @@
 //! Source: the chopped binning of Stich, Friedrich and Dietrich (2009), "Spatial Splits in Bounding Volume
 //! Hierarchies", section 4.3.
 
-use antumbra::Aabb;
-use antumbra::parts::SplitCost as Cost;
-use antumbra::Primitives;
 use crate::builders::sbvh::clip::{box_between, triangle_between};
+use antumbra::Aabb;
+use antumbra::Primitives;
+use antumbra::parts::SplitCost as Cost;
 
 /// Slabs per axis.
 const BINS: usize = 16;
