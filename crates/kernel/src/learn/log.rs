@@ -266,6 +266,7 @@ impl Observer for Logging<'_> {
 
 #[cfg(test)]
 mod tests {
+    use crate::api::steps::Steps;
     use crate::builder::Builder;
     use crate::geometry::primitives::PrimKind;
     use crate::geometry::primitives::Primitives;

@@ -14,8 +14,6 @@ pub(crate) mod arrange;
 pub(crate) mod joint;
 pub(crate) mod ratio;
 pub(crate) mod size;
-#[cfg(test)]
-mod worked_example;
 
 use crate::error::Error;
 use crate::learn::{Log, LogKind};

@@ -139,19 +139,56 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
 mod tests {
     use alloc::vec;
 
-    use antumbra_simd::{Dispatch, Isa};
+    use antumbra_simd::{Dispatch, Isa, Row};
     use antumbra_testkit::{Rng, mesh};
 
     use super::*;
     use crate::Bvh;
+    use crate::api::steps::Steps;
     use crate::builder::Builder;
     use crate::geometry::primitives::Primitives;
     use crate::geometry::{Geometry, Instance};
-    use crate::recipe::Order;
+    use crate::error::Error;
+    use crate::learn::Log;
+    use crate::order::Plan;
     use crate::trace::pick::Shuffle;
-    use crate::tree::any::Tree;
     use crate::tree::binary::BinaryTree;
+    use crate::tree::costs::CostModel;
+    use crate::tree::nodes::Nodes;
+    use crate::tree::slot_order::SlotOrder;
+    use crate::tree::wide::Tree;
     use crate::tree::width::Width as NodeWidth;
+
+    /// The farthest box first.
+    struct Farthest;
+
+    impl Row for Farthest {
+        fn name(&self) -> &'static str {
+            "farthest"
+        }
+
+        fn sentence(&self) -> &'static str {
+            "The farthest box first"
+        }
+
+        fn source(&self) -> Option<&'static str> {
+            None
+        }
+    }
+
+    impl Plan for Farthest {
+        fn plan(&self, tree: &Tree, _: Option<&Log>, _: &CostModel) -> Result<SlotOrder, Error> {
+            Ok(SlotOrder::of_nothing(tree))
+        }
+
+        fn picks_by_ray(&self) -> bool {
+            true
+        }
+
+        fn sort_for_ray(&self, entered: &[f32], lanes: &mut [u32]) {
+            lanes.sort_by(|a, b| entered[*a as usize].total_cmp(&entered[*b as usize]));
+        }
+    }
 
     /// Checks every place that is reported to it against the tree.
     struct Check<'a> {
@@ -168,7 +205,7 @@ mod tests {
     impl Check<'_> {
         fn child(&self, from: Place) -> ChildKind {
             let node = &self.bvh.nodes[self.nodes[from.visit as usize]];
-            node.child(from.slot as usize).kind()
+            node.any().kind(from.slot as usize)
         }
     }
 
@@ -182,7 +219,7 @@ mod tests {
             self.goes_on
         }
 
-        fn node(&mut self, visit: &NodeVisit<'_>) -> u32 {
+        fn node(&mut self, visit: &NodeVisit) -> u32 {
             if visit.from == Place::NONE {
                 assert_eq!(
                     (visit.node, self.nodes.len()),
@@ -250,11 +287,15 @@ mod tests {
         );
         let mut expected = vec![false; rays.len()];
         plain.occluded_batch(&rays, &mut expected);
-        let order = plain.plan(Order::Ftob, None, &Default::default());
-        plain.apply(&order.expect("learns from nothing"));
+        plain.tree.pick = Some(&Farthest);
 
-        let Tree::W8(bvh) = &plain.tree else {
+        let Nodes::W8(nodes) = &plain.tree.nodes else {
             unreachable!("8 wide")
+        };
+        let bvh = &WideTree {
+            nodes,
+            moves: &[],
+            tree: &plain.tree,
         };
         for isa in Isa::available() {
             let mut met = Vec::new();

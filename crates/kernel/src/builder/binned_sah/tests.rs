@@ -134,7 +134,7 @@ fn full_sweep(bounds: &[Aabb], prims: &mut [usize], cost: &Cost) -> f64 {
 
 #[test]
 fn the_tree_is_about_as_good_as_with_all_splits() {
-    let cost = Cost::new();
+    let cost = Cost::default();
     let generators = [mesh::soup, mesh::bumpy_grid, mesh::axis_aligned];
     let (mut found, mut best) = (0.0, 0.0);
     for seed in 0..24u64 {
