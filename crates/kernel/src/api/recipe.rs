@@ -18,7 +18,7 @@ use antumbra_simd::named_list;
 /// use antumbra::recipe::{Builder, Order};
 /// use antumbra::Recipe;
 ///
-/// let recipe = Recipe::default().builder(Builder::Sbvh).order(Order::SortPlus);
+/// let recipe = Recipe::default().builder(Builder::BinnedSah).order(Order::SortPlus);
 /// assert_eq!(recipe.order, Order::SortPlus);
 /// ```
 ///

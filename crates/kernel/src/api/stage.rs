@@ -84,7 +84,7 @@ impl Stage {
     /// Wide tree in its child order, ready for queries: learned from `rays`, or without any from surface rays.
     ///
     /// # Errors
-    /// [`Error::Cancelled`] if the monitor stopped it before it was done.
+    /// [`Error::Cancelled`] if the monitor stopped it before it was done; the error of an order that plugs in.
     pub fn learn(
         &self,
         rays: &[Ray],
@@ -258,8 +258,7 @@ impl BinaryStage {
             true => Order::Sato,
             false => recipe.order,
         };
-        bvh.learn_order(&training, None, &recipe.order(order))
-            .expect("the log is made here, of this tree and as the order asks for");
+        bvh.learn_order(&training, None, &recipe.order(order))?;
         reached(0.95, monitor)?;
         monitor.progress(1.0);
         Ok(bvh)

@@ -165,7 +165,7 @@ pub trait Plan: Row {
     /// learns from one and there were rays.
     ///
     /// # Errors
-    /// What the log lacks.
+    /// What the log lacks. Builds return it, and [`Bvh::relearn`](crate::Bvh::relearn) panics.
     fn plan(&self, tree: &Tree, log: Option<&Log>, costs: &CostModel) -> Result<SlotOrder, Error>;
 
     /// Whether [`Plan::sort_for_ray`] is called in every node. Occlusion queries then go ray by ray, and trees are saved

@@ -146,9 +146,9 @@ mod tests {
     use crate::Bvh;
     use crate::api::steps::Steps;
     use crate::builder::Builder;
+    use crate::error::Error;
     use crate::geometry::primitives::Primitives;
     use crate::geometry::{Geometry, Instance};
-    use crate::error::Error;
     use crate::learn::Log;
     use crate::order::Plan;
     use crate::trace::pick::Shuffle;

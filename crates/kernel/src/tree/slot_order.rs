@@ -57,8 +57,9 @@ impl SlotOrder {
         let mut slots = AS_THEY_ARE;
         let mut found = 0_u32;
         for (place, slot) in slots.iter_mut().enumerate().take(self.shape.width) {
-            *slot = from(place) as u8;
-            found |= 1_u32.checked_shl(u32::from(*slot)).unwrap_or(0);
+            let moved = from(place);
+            *slot = moved as u8;
+            found |= 1_u32.checked_shl(moved as u32).unwrap_or(0);
         }
         assert_eq!(
             found,
@@ -85,8 +86,7 @@ impl SlotOrder {
     }
 }
 
-/// Moves the places from `count` on, which are empty, to the end of a slot order. Planned orders have them there.
-/// Orders from a forged file or log may not.
+/// Moves the places from `count` on, which are empty, to the end of a slot order. The kernel's orders have them there.
 pub(super) fn occupied_first(places: &mut [u8], count: usize) {
     // Stable.
     places.sort_by_key(|place| usize::from(*place) >= count);

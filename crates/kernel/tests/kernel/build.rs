@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use crate::support::{builders_and_widths, equals_brute_by_builders, geometry};
+use crate::support::{BUILDERS, builders_and_widths, equals_brute_by_builders, geometry};
 use antumbra::recipe::{Builder, Clock, Collapse};
 use antumbra::{Bvh, Error, Geometry, Primitives, Ray, Recipe, Sphere, Width};
 use antumbra_testkit::{Rng, mesh};
@@ -14,7 +14,7 @@ fn the_tree_does_not_depend_on_the_number_of_threads() {
     let mut rng = Rng::new(21);
     // The first builder divides the work of large nodes, too.
     let [large, small] = [60_000, 12_000].map(|size| mesh::soup(&mut rng, size));
-    for builder in Builder::ALL {
+    for builder in BUILDERS {
         let mesh = match builder {
             Builder::BinnedSah => &large,
             _ => &small,
@@ -121,7 +121,7 @@ fn trees_stay_shallow() {
         .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
         .collect();
     let geometries = [Geometry::triangles(positions, indices)];
-    for builder in Builder::ALL {
+    for builder in BUILDERS {
         let options = Recipe::default().builder(builder).width(Width::W4);
         let bvh = Bvh::build(&geometries, &options).expect("indices in range");
         bvh.validate().expect("a valid tree");

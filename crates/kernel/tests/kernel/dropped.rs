@@ -5,7 +5,7 @@ use antumbra::recipe::{Builder, Collapse};
 use antumbra::{Bvh, DropReason, Dropped, Geometry, Instance, Isa, Primitives, Sphere, Width};
 use antumbra_testkit::{Rng, mesh};
 
-use crate::support::geometry;
+use crate::support::{BUILDERS, geometry};
 use crate::transforms::{IDENTITY, scale};
 
 #[test]
@@ -89,7 +89,7 @@ fn twins() -> [Primitives; 2] {
 #[test]
 fn a_binary_tree_knows_its_primitives() {
     let [own, other] = twins();
-    for builder in Builder::ALL {
+    for builder in BUILDERS {
         let tree = BinaryTree::build(&own, builder);
         assert!(tree.is_of(&own) && tree.is_of(&own.clone()) && !tree.is_of(&other));
     }

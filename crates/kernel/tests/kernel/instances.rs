@@ -1,7 +1,8 @@
 //! Scenes on two levels: every tree, order and level against brute force, and against flattened geometry.
 
 use crate::support::{
-    Odd, builders_and_collapses, builders_and_widths, for_every_tree, geometry, kernel_rays, quads,
+    BUILDERS, Odd, builders_and_collapses, builders_and_widths, for_every_tree, geometry,
+    kernel_rays, quads,
 };
 use crate::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
 use antumbra::parts::{BinaryTree, Learning, Steps, TreeLog, surface_rays};
@@ -254,7 +255,7 @@ fn trees_of_objects_do_not_depend_on_the_number_of_threads() {
     let instances: Vec<_> = (0..50)
         .map(|index| Instance::new(index % 3, transform(&mut rng)))
         .collect();
-    for builder in Builder::ALL {
+    for builder in BUILDERS {
         let options = Recipe::default().builder(builder);
         let built = [1, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);

@@ -1,6 +1,6 @@
 //! Scenes on two levels: what is counted, logged and learned, and surface rays.
 
-use crate::support::{geometry, kernel_rays};
+use crate::support::{BUILDERS, geometry, kernel_rays};
 use crate::transforms::{IDENTITY, product, rotation, scale, translation};
 use antumbra::parts::{BinaryTree, Cost, Learning, Steps, TreeLog, surface_rays};
 use antumbra::recipe::{Builder, Collapse, CostModel, Order};
@@ -140,7 +140,7 @@ fn trees_are_told_apart() {
 fn two_levels_do_not_depend_on_the_number_of_threads() {
     let mut rng = Rng::new(418);
     let (primitives, rays) = forest(&mut rng);
-    for builder in Builder::ALL {
+    for builder in BUILDERS {
         let options = Recipe::default().builder(builder);
         let built = [1, 2, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();

@@ -1,7 +1,7 @@
 //! Trees learned from logs: the same answers as ever, lower costs, and no harm to rays of another kind
 //! when the log is mixed.
 
-use crate::support::{builders_and_collapses, geometry, kernel_rays};
+use crate::support::{BY_RAY, builders_and_collapses, geometry, kernel_rays};
 use antumbra::parts::{BinaryTree, Cost, Learning, Steps, TreeLog, surface_rays};
 use antumbra::recipe::{Builder, Collapse, CostModel, Order};
 use antumbra::{Brute, Bvh, Geometry, Isa, Primitives, Ray, Recipe, Sphere, Width};
@@ -76,7 +76,7 @@ fn learned_trees_equal_brute_force() {
                     bvh.intersect_batch(&rays, &mut found.1);
                     assert!(found == expected, "{place}");
                 }
-                for order in [Order::Sato, Order::Embree, Order::Ftob] {
+                for order in [Order::Sato, Order::Embree, BY_RAY] {
                     let plan = bvh.plan(order, None, &learning.model).expect("no log");
                     let mut bvh = bvh.clone();
                     bvh.apply(&plan);

@@ -15,7 +15,7 @@
 //! - [`curves`]: thin curves: segments, joints, cubics
 //! - [`disks`]: disks, sound and not
 //! - [`user`]: user geometry, sound and not
-//! - [`saved`]: trees and orders in files
+//! - [`saved`]: trees, objects and worlds in files
 //! - [`dropped`]: what was dropped is named; trees know their primitives
 //! - [`beyond`]: learning while running, small leaves
 //! - [`batches`]: batches of every length, on one thread and several

@@ -2,8 +2,8 @@
 
 use std::panic::AssertUnwindSafe;
 
-use crate::support::geometry;
-use antumbra::parts::{Cost, Log, LogKind, Steps, Visits};
+use crate::support::{geometry, row};
+use antumbra::parts::{Cost, Log, LogKind, Plan, Row, SlotOrder, Steps, Tree};
 use antumbra::recipe::{Collapse, CostModel, Order};
 use antumbra::{Bvh, Error, Isa, Ray, Recipe, Width};
 use antumbra_testkit::{Mesh, Rng, mesh};
@@ -301,92 +301,80 @@ fn one_log_serves_all_orders_that_it_covers() {
     }
 }
 
-/// Of the oracle: one node test in a tree of one node; never more than any order takes, and the same for rays that
-/// nothing occludes; in a small tree, what the best of many random orders takes for each ray.
-#[test]
-fn no_order_beats_the_oracle() {
-    let seed = 16;
-    let mut rng = Rng::new(seed);
-    let mesh = scene(&mut rng);
-    let [training, test] = [2000, 3000].map(|count| {
-        (0..count)
-            .map(|_| Ray::between(rng.point(1.5), rng.point(1.5)))
-            .collect::<Vec<_>>()
-    });
-    for width in Width::ALL {
-        let built = build(&mesh, width);
-        let oracle = built.oracle_visits(&test);
-        assert!(
-            oracle.occluded_rays > 300 && oracle.unoccluded_rays > 50,
-            "seed {seed}: {oracle:?}"
-        );
-        let mut most = 0.0;
-        for order in Order::ALL {
-            let mut bvh = built.clone();
-            let log = order.log_kind().map(|kind| log(&bvh, kind, &training));
-            let plan = bvh.plan(order, log.as_ref(), &CostModel::default());
-            bvh.apply(&plan.expect("a log"));
-            let visits = bvh.visits(&test);
-            let place = format!("seed {seed} x{width} {order}: {visits:?}, oracle {oracle:?}");
-            assert_eq!(bvh.oracle_visits(&test), oracle, "{place}");
-            assert_eq!(visits.occluded_rays, oracle.occluded_rays, "{place}");
-            assert_eq!(
-                (visits.unoccluded_rays, visits.unoccluded_tests),
-                (oracle.unoccluded_rays, oracle.unoccluded_tests),
-                "{place}"
-            );
-            assert!(visits.occluded_tests >= oracle.occluded_tests, "{place}");
-            let tests = visits.occluded_tests + visits.unoccluded_tests;
-            assert_eq!(tests, node_tests(&bvh, &test), "{place}");
-            most = f64::max(most, visits.occluded());
+/// Slots in any order, the empty ones among them.
+struct Shuffled;
+
+row!(Shuffled, "shuffled", "All slots at random");
+
+impl Plan for Shuffled {
+    fn plan(&self, tree: &Tree, _: Option<&Log>, _: &CostModel) -> Result<SlotOrder, Error> {
+        let mut rng = Rng::new(18);
+        let mut order = SlotOrder::of_nodes(tree);
+        for index in 0..tree.node_count() {
+            let mut slots: Vec<_> = (0..tree.node(index).width()).collect();
+            for last in (1..slots.len()).rev() {
+                slots.swap(last, rng.below(last + 1));
+            }
+            order.arrange(index, |place| slots[place]);
         }
-        assert!(oracle.occluded() < 0.9 * most, "x{width}: {oracle:?}");
+        Ok(order)
     }
-    let nowhere = [Ray::new([f32::NAN; 3], [1.0; 3]); 3];
-    let bvh = build(&mesh, Width::W4);
-    let none = Visits {
-        unoccluded_rays: 3,
-        ..Visits::default()
-    };
-    assert_eq!(bvh.oracle_visits(&nowhere), none);
-    assert_eq!(bvh.visits(&nowhere), none);
-    assert_eq!(bvh.oracle_visits(&[]), Visits::default());
-    assert_eq!(none.occluded(), 0.0);
 }
 
-/// A tree of a few nodes: the shortest path of each ray is what it takes under the luckiest of all orders.
+/// An order that plugs in may say anything of empty slots.
 #[test]
-fn the_oracle_is_the_best_of_all_orders() {
-    let seed = 17;
-    let mut rng = Rng::new(seed);
-    let mesh = mesh::soup(&mut rng, 60);
-    let rays: Vec<_> = (0..200)
-        .map(|_| Ray::between(rng.point(1.2), rng.point(1.2)))
-        .collect();
-    let built = build(&mesh, Width::W4);
-    assert!(built.report().depth > 1);
-    let model = CostModel::default();
-    let mut best = vec![u32::MAX; rays.len()];
-    for ray in &rays {
-        // Learned from one ray alone, an order takes that ray the shortest way.
+fn empty_slots_stay_behind_the_others() {
+    let mut rng = Rng::new(19);
+    let mesh = scene(&mut rng);
+    let rays = shadow_rays(&mut rng, 1000);
+    for width in Width::ALL {
+        let built = build(&mesh, width);
         let mut bvh = built.clone();
-        let log = log(
-            &bvh,
-            Order::Joint.log_kind().expect("a learned order"),
-            core::slice::from_ref(ray),
-        );
-        let nodes_only = model.prim(0.0).cutout(0.0);
-        let plan = bvh.plan(Order::Joint, Some(&log), &nodes_only);
-        bvh.apply(&plan.expect("a log"));
-        let mut costs = vec![Cost::default(); rays.len()];
-        bvh.occluded_batch_counted(&rays, &mut vec![false; rays.len()], &mut costs);
-        for (best, cost) in best.iter_mut().zip(costs) {
-            *best = cost.node_tests.min(*best);
-        }
+        bvh.relearn(&[], &Recipe::default().order(Order::Other(&Shuffled)));
+        bvh.validate().expect("slots are permuted and no more");
+        assert_ne!(bvh.to_bytes(), built.to_bytes());
+        let (mut before, mut after) = (vec![false; rays.len()], vec![false; rays.len()]);
+        built.occluded_batch(&rays, &mut before);
+        bvh.occluded_batch(&rays, &mut after);
+        assert_eq!(before, after, "x{width}");
     }
-    for (ray, best) in rays.iter().zip(best) {
-        let oracle = built.oracle_visits(core::slice::from_ref(ray));
-        let tests = oracle.occluded_tests + oracle.unoccluded_tests;
-        assert_eq!(tests, u64::from(best), "seed {seed}: {ray:?}");
+}
+
+/// Puts every child of a node into one slot.
+struct Crowded;
+
+row!(Crowded, "crowded", "No permutation of the slots");
+
+impl Plan for Crowded {
+    fn plan(&self, tree: &Tree, _: Option<&Log>, _: &CostModel) -> Result<SlotOrder, Error> {
+        let mut order = SlotOrder::of_nodes(tree);
+        order.arrange(0, |_| 0);
+        Ok(order)
     }
+}
+
+#[test]
+#[should_panic(expected = "a permutation of the slots")]
+fn slots_are_not_lost() {
+    let bvh = build(&mesh::soup(&mut Rng::new(20), 50), Width::W8);
+    let _ = bvh.plan(Order::Other(&Crowded), None, &CostModel::default());
+}
+
+/// What an order learns from is missing.
+struct Picky;
+
+row!(Picky, "picky", "Never content with its log");
+
+impl Plan for Picky {
+    fn plan(&self, _: &Tree, _: Option<&Log>, _: &CostModel) -> Result<SlotOrder, Error> {
+        Err(Error::NeedsBoxes(self.name()))
+    }
+}
+
+#[test]
+fn the_error_of_an_order_that_plugs_in_is_returned() {
+    let mesh = mesh::soup(&mut Rng::new(21), 50);
+    let recipe = Recipe::default().order(Order::Other(&Picky));
+    let built = Bvh::build(&[geometry(&mesh)], &recipe);
+    assert_eq!(built.err(), Some(Error::NeedsBoxes("picky")));
 }

@@ -1,7 +1,7 @@
 //! Queries about points: every tree against brute force, and brute force against what is known.
 
 use crate::instances::Scene;
-use crate::support::{cases, for_every_tree, geometry};
+use crate::support::{TWICE, cases, for_every_tree, geometry};
 use crate::transforms::{Transform, rotation, transform};
 use antumbra::recipe::Builder;
 use antumbra::{
@@ -229,7 +229,7 @@ fn closed_bodies_contain_what_is_inside() {
         ),
         (vec![geometry(&ball), core], Some([2, 1, 0]), filled),
     ] {
-        for builder in [Builder::Reinsertion, Builder::Sbvh] {
+        for builder in [Builder::Reinsertion, TWICE] {
             let recipe = Recipe::default().builder(builder);
             let bvh = Bvh::build(&list, &recipe).expect("in range");
             let corners = ball.positions.iter().map(|position| {

@@ -12,7 +12,7 @@ use antumbra::{
 };
 use antumbra_testkit::{Rng, mesh, rays};
 
-use crate::support::{bits, brute, cutouts, geometry, kernel_rays, square, upwards};
+use crate::support::{BY_RAY, bits, brute, cutouts, geometry, kernel_rays, square, upwards};
 use crate::transforms::{Transform, product, rotation, scale, translation};
 
 /// A tree over a bumpy grid, and rays of all kinds.
@@ -32,7 +32,7 @@ fn grid(width: Width, order: Order, count: usize) -> (Bvh, Vec<Ray>) {
 fn threads_share_a_tree() {
     for (width, order) in [
         (Width::W4, Order::Joint),
-        (Width::W8, Order::Ftob),
+        (Width::W8, BY_RAY),
         (Width::W16, Order::Joint),
     ] {
         let (bvh, rays) = grid(width, order, 4000);
@@ -355,7 +355,7 @@ fn columns_that_are_too_short_are_errors() {
 #[test]
 #[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn sorted_batches_give_the_same_answers_in_the_same_places() {
-    for order in [Order::Joint, Order::Ftob] {
+    for order in [Order::Joint, BY_RAY] {
         let (bvh, rays) = grid(Width::W8, order, 40_000);
         for len in [1, 2, 9, 5000, 40_000] {
             let rays = &rays[..len];

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use crate::support::{
-    Odd, Stripes, bits, brute, builders_and_collapses, cases, cutouts, geometry, kernel_rays, quads,
+    Odd, Stripes, bits, brute, builders_and_collapses, cases, cutouts, geometry, kernel_rays,
+    orders, quads,
 };
-use antumbra::recipe::Order;
 use antumbra::{Bvh, Error, Geometry, Instance, Isa, Primitives, Recipe, Sphere, Width};
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
@@ -73,7 +73,7 @@ proptest! {
         let rays = kernel_rays(&rays::around(&mut rng, &after[0], 120));
         for (builder, collapse) in builders_and_collapses() {
             let width = Width::ALL[rng.below(Width::ALL.len())];
-            let order = Order::ALL[rng.below(Order::ALL.len())];
+            let order = orders()[rng.below(orders().len())];
             let recipe = Recipe::default().builder(builder).collapse(collapse).width(width).order(order);
             let place = format!("seed {seed}, {builder} {collapse} x{width} {order}");
             let mut bvh = Bvh::build(&first, &recipe).expect("indices in range");

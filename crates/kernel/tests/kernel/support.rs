@@ -3,11 +3,14 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity};
-use antumbra::parts::{BinaryTree, Learning, Steps, TreeLog};
-use antumbra::recipe::{Builder, Collapse, Order, Preset};
+use antumbra::parts::{
+    BinaryKind, BinaryNode, BinaryTree, Grow, Learning, Log, Plan, SlotOrder, Steps, Tree, TreeLog,
+    binned_subtree,
+};
+use antumbra::recipe::{Builder, Collapse, CostModel, Order, Preset};
 use antumbra::{
-    Aabb, Brute, Build, Bvh, Geometry, Hit, Isa, Primitives, Ray, Recipe, UserGeometry, UserHit,
-    Width,
+    Aabb, Brute, Build, Bvh, Error, Geometry, Hit, Isa, Primitives, Ray, Recipe, UserGeometry,
+    UserHit, Width,
 };
 use antumbra_testkit::{Mesh, Rng, TestRay};
 
@@ -76,6 +79,97 @@ pub fn kernel_rays(rays: &[TestRay]) -> Vec<Ray> {
         .collect()
 }
 
+/// What lists say of something that plugs in.
+macro_rules! row {
+    ($Type:ty, $name:literal, $sentence:literal) => {
+        impl antumbra::parts::Row for $Type {
+            fn name(&self) -> &'static str {
+                $name
+            }
+
+            fn sentence(&self) -> &'static str {
+                $sentence
+            }
+
+            fn source(&self) -> Option<&'static str> {
+                None
+            }
+        }
+    };
+}
+pub(crate) use row;
+
+/// A builder that plugs in and wants rays: every primitive is in two leaves if there are any rays.
+struct Twice;
+
+row!(Twice, "twice", "Every primitive in two leaves");
+
+impl Grow for Twice {
+    fn needs_rays(&self) -> bool {
+        true
+    }
+
+    fn grow(&self, primitives: &Primitives, rays: &[Ray]) -> Vec<BinaryTree> {
+        let grow = |primitives: &Primitives| {
+            let count = primitives.len() as u32;
+            let prims: Vec<_> = (0..count).collect();
+            let half = binned_subtree(primitives, &prims, 1);
+            if rays.is_empty() || count == 0 {
+                return half;
+            }
+            let kind = BinaryKind::Inner {
+                right: 1 + half.nodes.len() as u32,
+            };
+            let root = BinaryNode {
+                kind,
+                ..half.nodes[0]
+            };
+            let mut nodes = [&[root], &half.nodes[..], &half.nodes[..]].concat();
+            for node in &mut nodes[1 + half.nodes.len()..] {
+                if let BinaryKind::Leaf { first, .. } = &mut node.kind {
+                    *first += count;
+                }
+            }
+            BinaryTree::new(nodes, half.prims.repeat(2))
+        };
+        let objects = primitives.object_list().iter();
+        [primitives].into_iter().chain(objects).map(grow).collect()
+    }
+}
+
+/// A builder that has every primitive in two leaves.
+pub const TWICE: Builder = Builder::Other(&Twice);
+
+/// The builders of the kernel, and one that plugs in.
+pub const BUILDERS: [Builder; 3] = [Builder::BinnedSah, Builder::Reinsertion, TWICE];
+
+/// A child order that plugs in and looks at the ray: the nearest box first.
+struct Nearest;
+
+row!(Nearest, "nearest", "The nearest box first");
+
+impl Plan for Nearest {
+    fn plan(&self, tree: &Tree, _: Option<&Log>, _: &CostModel) -> Result<SlotOrder, Error> {
+        Ok(SlotOrder::of_nothing(tree))
+    }
+
+    fn picks_by_ray(&self) -> bool {
+        true
+    }
+
+    fn sort_for_ray(&self, entered: &[f32], lanes: &mut [u32]) {
+        lanes.sort_by(|a, b| entered[*b as usize].total_cmp(&entered[*a as usize]));
+    }
+}
+
+/// A child order that looks at the ray.
+pub const BY_RAY: Order = Order::Other(&Nearest);
+
+/// The child orders of the kernel, and one that plugs in.
+pub fn orders() -> Vec<Order> {
+    Order::ALL.into_iter().chain([BY_RAY]).collect()
+}
+
 /// The default builder with every collapse, and every other builder with one collapse after the other: the two know
 /// nothing of each other.
 pub fn builders_and_collapses() -> impl Iterator<Item = (Builder, Collapse)> {
@@ -93,7 +187,7 @@ pub fn builders_and_widths() -> impl Iterator<Item = (Builder, Width)> {
 
 fn other_builders() -> impl Iterator<Item = Builder> {
     let is_other = |builder: &Builder| *builder != Builder::default();
-    Builder::ALL.into_iter().filter(is_other)
+    BUILDERS.into_iter().filter(is_other)
 }
 
 /// A tree of every preset and width, and of every builder, width and order, traced at each level in turn. What learns
@@ -114,8 +208,9 @@ pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnM
             check_levels(bvh, &format!("preset {preset} x{width}"));
         }
     }
-    let mut turns = Order::ALL.into_iter().cycle();
-    for builder in Builder::ALL.into_iter().take(if few { 1 } else { 99 }) {
+    let orders = orders();
+    let mut turns = orders.iter().copied().cycle();
+    for builder in BUILDERS.into_iter().take(if few { 1 } else { 99 }) {
         let recipe = Recipe::default()
             .builder(builder)
             .collapse(Collapse::Area)
@@ -128,7 +223,7 @@ pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnM
             let recipe = recipe.width(width);
             let built = stage.collapse(&[], &recipe, &()).expect("nobody stops it");
             let orders = match builder {
-                Builder::BinnedSah if !few => Order::ALL.to_vec(),
+                Builder::BinnedSah if !few => orders.clone(),
                 _ => turns.by_ref().take(1).collect(),
             };
             for order in orders {
@@ -144,7 +239,7 @@ pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnM
 /// does, in every collapse.
 pub fn equals_brute_by_builders(name: &str, primitives: &Primitives, rays: &[Ray]) {
     let brute = Brute::new(primitives);
-    for builder in Builder::ALL {
+    for builder in BUILDERS {
         let tree = BinaryTree::build_for(primitives, builder, rays);
         let mut log = TreeLog::new(&tree);
         log.add(primitives, &tree, rays, rays.len() as f32);

@@ -4,7 +4,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use antumbra::cutout::{Candidate, Opacity, QueryKind};
-use antumbra::recipe::Builder;
 use antumbra::{
     Brute, Bvh, Geometry, Hit, INVALID_ID, Instance, PrimId, Primitives, Ray, RayOrder, Recipe,
     Sphere, Visit,
@@ -13,7 +12,7 @@ use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 
 use crate::support::{
-    Odd, bits, cases, cutouts, for_every_tree, geometry, kernel_rays, quads, square,
+    BUILDERS, Odd, bits, cases, cutouts, for_every_tree, geometry, kernel_rays, quads, square,
 };
 use crate::transforms::transform;
 
@@ -263,7 +262,7 @@ fn a_triangle_in_many_leaves_is_told_once() {
     large.indices.extend(moved);
     let primitives = Primitives::new(&[geometry(&large)]).expect("in range");
     let brute = Brute::new(&primitives);
-    for builder in Builder::ALL {
+    for builder in BUILDERS {
         let bvh = Bvh::build(&primitives, &Recipe::default().builder(builder)).expect("a tree");
         for _ in 0..300 {
             // Nearly in the plane of the square: through many leaves that hold it.

@@ -1,8 +1,8 @@
 //! No ray from inside a closed mesh gets out, however exactly it is aimed at an edge or a corner.
 
-use crate::support::geometry;
+use crate::support::{BUILDERS, geometry};
 use antumbra::parts::{BinaryTree, Steps};
-use antumbra::recipe::{Builder, Collapse};
+use antumbra::recipe::Collapse;
 use antumbra::{Brute, Bvh, Isa, Primitives, Ray, Width};
 use antumbra_testkit::{Mesh, Rng, mesh};
 
@@ -42,11 +42,11 @@ fn rays_at_edges_and_corners_do_not_leak() {
     let mut rng = Rng::new(seed);
     let meshes = closed_meshes(&mut rng);
     let levels: Vec<_> = Isa::available().collect();
-    let runs = meshes.len() * Builder::ALL.len() * Width::ALL.len() * levels.len();
+    let runs = meshes.len() * BUILDERS.len() * Width::ALL.len() * levels.len();
     let mut traced = 0;
     for (mesh, room) in &meshes {
         let primitives = Primitives::new(&[geometry(mesh)]).expect("indices in range");
-        let trees = Builder::ALL.map(|builder| (builder, BinaryTree::build(&primitives, builder)));
+        let trees = BUILDERS.map(|builder| (builder, BinaryTree::build(&primitives, builder)));
         let center = if mesh.name == "moved" {
             [7.7, -3.3, 9.1]
         } else {
@@ -200,7 +200,7 @@ fn all_hit(rng: &mut Rng, mesh: &Mesh, name: &str) -> usize {
     for (ray, found) in rays.iter().zip(&found) {
         assert!(found.is_some(), "{name}, no tree: {ray:?}");
     }
-    let builder = Builder::ALL[rng.below(Builder::ALL.len())];
+    let builder = BUILDERS[rng.below(BUILDERS.len())];
     let tree = BinaryTree::build(&primitives, builder);
     let mut traced = 0;
     for (width, isa) in Width::ALL

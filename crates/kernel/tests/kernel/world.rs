@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use crate::instances::{Expected, Scene};
-use crate::support::{Stripes, bits, cases, cutouts, geometry, square};
+use crate::support::{BUILDERS, Stripes, bits, cases, cutouts, geometry, orders, square};
 use crate::transforms::{IDENTITY, transform, translation};
 use antumbra::parts::{Cost, Steps};
-use antumbra::recipe::{Builder, Order, Preset};
+use antumbra::recipe::Preset;
 use antumbra::{
     Bvh, Error, Functions, Geometry, Instance, Object, Primitives, Ray, Recipe, Saved,
     UserGeometry, Width, World,
@@ -18,7 +18,7 @@ use proptest::prelude::*;
 /// A recipe like any.
 fn recipe(rng: &mut Rng) -> Recipe {
     let preset = Preset::ALL[rng.below(Preset::ALL.len())];
-    let builder = Builder::ALL[rng.below(Builder::ALL.len())];
+    let builder = BUILDERS[rng.below(BUILDERS.len())];
     let width = Width::ALL[rng.below(Width::ALL.len())];
     preset.recipe().builder(builder).width(width)
 }
@@ -178,7 +178,7 @@ proptest! {
         for step in 0..4 {
             if rng.below(2) == 0 {
                 let rays = scene.rays(&mut rng, 50);
-                let order = Order::ALL[rng.below(Order::ALL.len())];
+                let order = orders()[rng.below(orders().len())];
                 match rng.below(2) {
                     0 => drop(world.relearn(&rays, &recipe.order(order))),
                     // The copy stands where the world stood before.

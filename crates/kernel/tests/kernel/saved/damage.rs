@@ -206,7 +206,7 @@ fn ask(bvh: &Bvh, rays: &[Ray]) {
 fn forged_files_do_no_harm() {
     let mut rng = Rng::new(6);
     let (mut refused, mut taken) = (0, 0);
-    for (index, order) in [Order::Joint, Order::Ftob, Order::SortPlus]
+    for (index, order) in [Order::Joint, Order::Visits, Order::SortPlus]
         .into_iter()
         .enumerate()
     {

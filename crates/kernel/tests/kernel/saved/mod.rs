@@ -1,24 +1,22 @@
 //! Trees, objects and worlds in files: the same answers at the same cost, and no harm from files that are damaged or forged.
 //!
 //! - [`damage`]: files that are damaged or forged
-//! - [`orders`]: orders and logs
 
 mod damage;
-mod orders;
 
 use std::io::{self, Read, Write};
 use std::sync::Arc;
 
 use antumbra::cutout::Opacity;
 use antumbra::parts::{Cost, Steps};
-use antumbra::recipe::{Builder, Order};
+use antumbra::recipe::Order;
 use antumbra::{
     Aabb, Brute, Bvh, Curves, Error, Functions, Geometry, GeometryId, Instance, Isa, Object,
     Primitives, Ray, Recipe, Saved, Sphere, UserGeometry, UserHit, Width, World,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 
-use crate::support::{Odd, Stripes, bits, cutouts, geometry, kernel_rays, quads};
+use crate::support::{BUILDERS, Odd, Stripes, bits, cutouts, geometry, kernel_rays, quads};
 use crate::transforms::transform;
 use damage::{FRAME, framed, opened};
 
@@ -230,7 +228,7 @@ fn saved_trees_answer_as_built_ones_at_the_same_cost() {
         let (primitives, rays) = (scene.primitives(), &scene.rays[..]);
         let brute = Brute::new(&primitives);
         for width in Width::ALL {
-            for order in [Order::Joint, Order::Ftob] {
+            for order in [Order::Joint, Order::Simple] {
                 let recipe = Recipe::default().width(width).order(order);
                 let built = Bvh::learn(&primitives, rays, &recipe).expect("a tree");
                 let bytes = saved(&built);
@@ -368,7 +366,7 @@ fn loaded_objects_are_placed_as_the_original() {
 #[test]
 fn trees_of_every_builder_come_back() {
     let mesh = mesh::soup(&mut Rng::new(25), 300);
-    for builder in Builder::ALL {
+    for builder in BUILDERS {
         let recipe = Recipe::default().builder(builder).width(Width::W8);
         let built = Bvh::build(&[geometry(&mesh)], &recipe).expect("in range");
         let file = saved(&built);
