@@ -5,11 +5,11 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity};
-use antumbra::recipe::{Builder, Order};
 use antumbra::{
     Aabb, Brute, Build, Bvh, Geometry, Hit, Instance, Isa, Masks, Object, PrimId, Primitives, Ray,
     RayQuery, Recipe, Sphere, UserGeometry, UserHit, Width, World,
 };
+use antumbra_trees::{BUILDERS, ORDERS};
 use libfuzzer_sys::fuzz_target;
 
 /// What the input says, byte by byte; zeros when it has said everything.
@@ -281,8 +281,8 @@ fuzz_target!(|bytes: &[u8]| {
     let rays: Vec<_> = (0..1 + script.below(24)).map(|_| script.ray()).collect();
     let (masks, mask) = (script.masks(), [1, 2, 3, 0][usize::from(script.below(4))]);
     let (builder, order) = (
-        script.below(Builder::ALL.len() as u8),
-        script.below(Order::ALL.len() as u8 + 4),
+        script.below(BUILDERS.len() as u8),
+        script.below(ORDERS.len() as u8 + 4),
     );
 
     let Ok(primitives) = Primitives::with_instances(&world, &objects, &instances) else {
@@ -303,11 +303,11 @@ fuzz_target!(|bytes: &[u8]| {
         .collect();
 
     // An order beyond the last stands for the default recipe: learned collapse, `joint`.
-    let recipe = match Order::ALL.get(usize::from(order)) {
+    let recipe = match ORDERS.get(usize::from(order)) {
         None => Recipe::default(),
         Some(&order) => Recipe::fast().order(order),
     };
-    let recipe = recipe.builder(Builder::ALL[usize::from(builder)]);
+    let recipe = recipe.builder(BUILDERS[usize::from(builder)]);
     let build = Build::new(&primitives).rays(&rays).recipe(&recipe);
     let stage = build.stage().expect("nobody stops it");
     for width in Width::ALL {

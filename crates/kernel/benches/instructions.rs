@@ -1,5 +1,5 @@
 //! Work for `bench/instructions`, which counts the instructions of it: see there. Prints one line per count, in
-//! the order in which the counts come: a name, and by how many steps or rays to divide.
+//! the order in which the counts come: a name, and by how many rays to divide.
 
 mod cases;
 
@@ -18,12 +18,7 @@ fn counts_begin_anew() {
 
 type Kind = (&'static str, fn(&mut Work<'_>) -> usize);
 
-const KINDS: [Kind; 10] = [
-    ("set-up", |work| work.set_up()),
-    ("node/occluded", |work| work.node_occluded()),
-    ("node/intersect", |work| work.node_intersect()),
-    ("leaf/occluded", |work| work.leaf_occluded()),
-    ("leaf/intersect", |work| work.leaf_intersect()),
+const KINDS: [Kind; 5] = [
     ("missed", |work| work.missed()),
     ("batch/occluded", |work| work.batch_occluded()),
     ("batch/intersect", |work| work.batch_intersect()),
@@ -40,9 +35,9 @@ fn main() {
         let mut work = Work::new(&scene);
         for (name, kind) in KINDS {
             counts_begin_anew();
-            let units = kind(&mut work);
+            let rays = kind(&mut work);
             counts_begin_anew();
-            println!("{case}/{name} {units}");
+            println!("{case}/{name} {rays}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Trees for comparison with those of the kernel: builders, collapses and child orders from papers and other renderers, which
+//! Trees for comparison with the ones in the kernel: builders, collapses and child orders from papers and other renderers, which
 //! plug into [`antumbra::parts`], and a bound for every order.
 //!
 //! [`ORDERS`], [`BUILDERS`] and [`COLLAPSES`] have the kernel's rows and these, in the order in which studies show them.
@@ -19,6 +19,8 @@
 mod builders;
 mod collapses;
 mod orders;
+#[cfg(test)]
+mod test_primitives;
 
 pub use builders::{
     BUILDERS, PBRT, PBRT_2015, PLOC, PLOC_REINSERTION, RDH, SBVH, SRDH, VDBVH, builder,

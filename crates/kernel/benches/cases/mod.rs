@@ -1,20 +1,15 @@
-//! What the benches measure: the steps of a traversal and whole queries, on a small scene that is fixed for
-//! ever, so that what is measured today can be compared with what was measured before.
+//! What is counted: whole queries, on a small scene that is fixed for ever, so that what is measured today can be compared with what was measured before.
 
 use std::fmt;
-use std::hint::black_box;
 
-use antumbra::parts::steps::Steps;
 use antumbra::recipe::{Collapse, Order};
 use antumbra::{Bvh, Geometry, Hit, Isa, Ray, Recipe, Width};
 use antumbra_testkit::{mesh, rng::Rng};
 
-/// The tree fits into a first-level cache with the rays of single steps and what is prepared of them: steps are
-/// measured, not memory.
+/// The tree fits into a first-level cache: steps are measured, not memory.
 const TRIANGLES: usize = 128;
-const STEP_RAYS: usize = 64;
 
-/// Rays of whole queries: too many for a CPU to learn by heart which way each of them goes.
+/// Too many for a CPU to learn by heart which way each of them goes.
 const RAYS: usize = 1024;
 
 /// A width on an instruction set.
@@ -65,7 +60,6 @@ impl Scene {
 /// Everything that is measured: each method does something many times and returns how many times.
 pub struct Work<'a> {
     scene: &'a Scene,
-    steps: Steps<'a>,
     occluded: Vec<bool>,
     hits: Vec<Option<Hit>>,
 }
@@ -76,7 +70,6 @@ impl<'a> Work<'a> {
     pub fn new(scene: &'a Scene) -> Self {
         let mut work = Self {
             scene,
-            steps: Steps::new(&scene.bvh, &scene.rays[..STEP_RAYS]),
             occluded: vec![false; RAYS],
             hits: vec![None; RAYS],
         };
@@ -85,16 +78,6 @@ impl<'a> Work<'a> {
     }
 
     fn check(&mut self) {
-        assert_eq!(self.steps.set_up(), STEP_RAYS);
-        // Box tests are conservative but not exact: a box that is merely touched may count or not.
-        let below_root = self.steps.nodes() - STEP_RAYS + self.steps.leaves();
-        for pushed in [self.steps.nodes_occluded(), self.steps.nodes_intersect()] {
-            assert!(pushed.abs_diff(below_root) <= below_root / 100);
-        }
-        let occluding = self.steps.leaves_occluded();
-        assert!(occluding > 0);
-        assert_eq!(occluding, self.steps.leaves_intersect());
-
         self.missed();
         assert!(!self.occluded.contains(&true));
         self.batch_occluded();
@@ -109,30 +92,6 @@ impl<'a> Work<'a> {
         let hits = self.hits.clone();
         self.single_intersect();
         assert_eq!(hits, self.hits);
-    }
-
-    pub fn set_up(&mut self) -> usize {
-        self.steps.set_up()
-    }
-
-    pub fn node_occluded(&mut self) -> usize {
-        black_box(self.steps.nodes_occluded());
-        self.steps.nodes()
-    }
-
-    pub fn node_intersect(&mut self) -> usize {
-        black_box(self.steps.nodes_intersect());
-        self.steps.nodes()
-    }
-
-    pub fn leaf_occluded(&mut self) -> usize {
-        black_box(self.steps.leaves_occluded());
-        self.steps.leaves()
-    }
-
-    pub fn leaf_intersect(&mut self) -> usize {
-        black_box(self.steps.leaves_intersect());
-        self.steps.leaves()
     }
 
     /// Rays that a set-up and one node step are enough for: the rest is the cost of keeping a stream going.

@@ -10,6 +10,8 @@ mod pieces;
 mod ploc;
 mod ray_driven;
 mod sbvh;
+#[cfg(test)]
+mod tests;
 
 use antumbra::parts::{BinaryTree, Grow};
 use antumbra::recipe::{Builder, UnknownName};

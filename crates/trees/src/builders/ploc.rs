@@ -229,7 +229,7 @@ impl Forest<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::test_primitives::primitives;
+    use crate::test_primitives::primitives;
     use antumbra_testkit::{Rng, mesh};
 
     /// Of few clusters the two that are nearest to each other are always made one, and everyone's partner is the nearest.

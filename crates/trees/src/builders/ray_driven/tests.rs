@@ -1,18 +1,15 @@
 //! Counts against counting; costs against the models they come from.
 
 use crate::builders::ray_driven::evidence::AllEvidence;
-use crate::builders::ray_driven::rdh::Rdh;
+use crate::builders::ray_driven::rdh::RdhCost;
 use crate::builders::ray_driven::seen::Seen;
-use crate::builders::ray_driven::srdh::Srdh;
+use crate::builders::ray_driven::srdh::SrdhCost;
 use crate::builders::ray_driven::*;
-use crate::geometry::test_primitives::primitives;
-use antumbra::Ray;
-use antumbra::parts::RaySetup;
-use antumbra::parts::SplitCost as Cost;
-use antumbra::parts::surface_rays;
+use crate::test_primitives::primitives;
+use antumbra::parts::{RaySetup, SplitCost as Cost, surface_rays};
 use antumbra::recipe::Builder;
-use antumbra::{Geometry, Instance};
-use antumbra_testkit::{Rng, mesh};
+use antumbra::{Brute, Geometry, Instance, Ray, Sphere};
+use antumbra_testkit::{Mesh, Rng, mesh};
 
 /// Everything a side of a split is said to have is counted again, ray by ray and primitive by primitive.
 #[test]
@@ -29,7 +26,7 @@ fn sides_are_counted_exactly() {
         let plan = Plan {
             primitives: &primitives,
             evidence,
-            cost: &Rdh::new(),
+            cost: &RdhCost::default(),
         };
         // Every second primitive, as if the others had been split off.
         let prims: Vec<u32> = (0..primitives.len() as u32).step_by(2).collect();
@@ -58,7 +55,7 @@ fn sides_are_counted_exactly() {
                         |place: usize| (usize::from(candidates.bins[place]) < split) == (side == 0);
                     let inside = || (0..prims.len()).filter(|place| here(*place));
                     let bounds = inside().fold(Aabb::EMPTY, |all, place| all.union(&boxes[place]));
-                    let entered = evidence.rays.iter().filter(|ray| hits_box(ray, &bounds));
+                    let entered = evidence.rays.iter().filter(|ray| ray.hits_box(&bounds));
                     let hits = (0..200).filter(|ray| {
                         let mut hits = places.iter();
                         hits.any(|hit| hit.0 == *ray && here(hit.1))
@@ -91,67 +88,76 @@ fn sides_are_counted_exactly() {
     }
 }
 
+/// Rays of all directions through the middle.
+fn rays_between(rng: &mut Rng, count: usize) -> Vec<Ray> {
+    (0..count)
+        .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
+        .collect()
+}
+
+/// Brute force over each triangle of a mesh by itself, where it is or where an instance places it.
+fn one_by_one(mesh: &Mesh, placed: Option<Instance>) -> Vec<Brute> {
+    let alone = mesh.indices.iter().map(|corners| {
+        let geometry = [Geometry::triangles(&mesh.positions[..], vec![*corners])];
+        let primitives = match placed {
+            None => Primitives::new(&geometry),
+            Some(instance) => Primitives::with_instances(&[], &[geometry], &[instance]),
+        };
+        Brute::new(&primitives.expect("indices in range"))
+    });
+    alone.collect()
+}
+
+/// What each of these rays hits; rays that hit nothing are left out.
+fn hits_of(brute: &[Brute], rays: &[Ray]) -> Vec<Vec<u32>> {
+    let hits = rays.iter().map(|ray| {
+        let prims = 0..brute.len() as u32;
+        prims
+            .filter(|prim| brute[*prim as usize].occluded(ray))
+            .collect::<Vec<_>>()
+    });
+    hits.filter(|hits| !hits.is_empty()).collect()
+}
+
 /// A ray has every primitive that it hits, in the world and in the object of every instance that it enters.
 #[test]
 fn evidence_is_that_of_brute_force() {
     let seed = 76;
     let mut rng = Rng::new(seed);
     let [object, world] = [(); 2].map(|()| mesh::soup(&mut rng, 60));
-    let [object, world] =
-        [&object, &world].map(|mesh| [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])]);
     let instances: Vec<_> = (0..10)
-        .map(|_| Instance {
-            object: 0,
-            transform: std::array::from_fn(|_| std::array::from_fn(|_| rng.range(-1.0, 1.0))),
+        .map(|_| {
+            let transform = std::array::from_fn(|_| std::array::from_fn(|_| rng.range(-1.0, 1.0)));
+            Instance::new(0, transform)
         })
         .collect();
+    let [of_object, of_world] =
+        [&object, &world].map(|mesh| [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])]);
     let primitives =
-        Primitives::with_instances(&world, &[object], &instances).expect("indices in range");
-    let rays: Vec<_> = (0..2000)
-        .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
-        .collect();
-
-    // As hits are listed: sorted, for the trees do not matter.
-    let expect = |primitives: &Primitives, setups: &[RaySetup]| {
-        let mut hits = Vec::new();
-        for (ray, setup) in setups.iter().enumerate() {
-            let found = (0..primitives.len() as u32).filter(|prim| {
-                let hit = primitives.hit(*prim as usize, setup, QueryKind::Occluded);
-                hit.is_some()
-            });
-            hits.extend(found.map(|prim| (ray as u32, prim)));
-        }
-        hits
-    };
+        Primitives::with_instances(&of_world, &[of_object], &instances).expect("indices in range");
+    let rays = rays_between(&mut rng, 2000);
     let all = AllEvidence::new(&primitives, &rays);
-    let mut inside = Vec::new();
-    for ray in &all.world.rays {
-        for placed in &primitives.instances {
-            let mut object = RaySetup::IDLE;
-            let entered = placed
-                .placement
-                .enter(antumbra_simd::Scalar, ray, &mut object);
-            inside.extend(entered.map(|_| object));
-        }
-    }
     assert_eq!(all.world.rays.len(), rays.len());
-    assert!(inside.len() > 100);
-    // Instances are entered in the order of the tree; their rays differ in the transformed origin.
-    let key = |setup: &RaySetup| [setup.org, setup.dir].map(|vector| vector.map(f32::to_bits));
-    let mut found: Vec<_> = all.objects[0].rays.iter().map(key).collect();
-    let mut expected: Vec<_> = inside.iter().map(key).collect();
-    found.sort();
-    expected.sort();
-    assert_eq!(found, expected);
-    for (primitives, evidence) in [
-        (&primitives, &all.world),
-        (&primitives.objects[0], &all.objects[0]),
-    ] {
-        let hits = expect(primitives, &evidence.rays);
-        let mut found = evidence.hits.clone();
+    let entered = all.objects[0].rays.len();
+    assert!(entered > 100 && entered < rays.len() * instances.len());
+
+    let in_world = hits_of(&one_by_one(&world, None), &rays);
+    let in_instances = instances
+        .iter()
+        .flat_map(|instance| hits_of(&one_by_one(&object, Some(*instance)), &rays))
+        .collect();
+    // Sorted, for the trees do not matter, and in which order they are entered.
+    for (evidence, mut expected) in [(&all.world, in_world), (&all.objects[0], in_instances)] {
+        let mut found: Vec<Vec<u32>> = evidence
+            .hits
+            .chunk_by(|a, b| a.0 == b.0)
+            .map(|hits| hits.iter().map(|hit| hit.1).collect())
+            .collect();
+        found.iter_mut().for_each(|hits| hits.sort());
         found.sort();
-        assert_eq!(found, hits);
-        assert!(hits.len() > 20);
+        expected.sort();
+        assert_eq!(found, expected);
+        assert!(found.len() > 20);
     }
 }
 
@@ -194,9 +200,24 @@ fn evidence_by_area_gives_the_surface_area_heuristic() {
             .map(|side| side.area / PARENT.area * f64::from(cost.weight_of(side.prims)))
             .sum();
         let [left, right] = sides;
-        let found = Rdh::new().of(&PARENT, &left, &right);
+        let found = RdhCost::default().of(&PARENT, &left, &right);
         assert!((found - expected).abs() < 1e-9, "{found} {expected}");
     }
+}
+
+/// Rays made ready for a tree, whose primitives do not matter.
+fn ready(rays: &[Ray]) -> Vec<RaySetup> {
+    let mut all = Vec::new();
+    let primitives = Primitives::new(&[Geometry::spheres(vec![Sphere {
+        center: [0.0; 3],
+        radius: 1.0,
+    }])]);
+    let primitives = primitives.expect("a sphere");
+    // So many at a time that all are used.
+    for rays in rays.chunks(1 << 14) {
+        all.extend(AllEvidence::new(&primitives, rays).world.rays);
+    }
+    all
 }
 
 /// Lines in all directions, equally many everywhere, enter boxes by their areas: RDH comes to what the surface area
@@ -211,12 +232,15 @@ fn uniform_rays_enter_boxes_by_area() {
     };
     // Chords between uniform points of a sphere around the box are such lines.
     let rays: Vec<_> = (0..40_000)
-        .filter_map(|_| RaySetup::new(&Ray::between(rng.direction(), rng.direction()), 1.0))
-        .filter(|ray| hits_box(ray, &parent))
+        .map(|_| Ray::between(rng.direction(), rng.direction()))
+        .collect();
+    let rays: Vec<_> = ready(&rays)
+        .into_iter()
+        .filter(|ray| ray.hits_box(&parent))
         .collect();
     let measure = |bounds: &Aabb| Measure {
         area: area(bounds),
-        entered: rays.iter().filter(|ray| hits_box(ray, bounds)).count(),
+        entered: rays.iter().filter(|ray| ray.hits_box(bounds)).count(),
         ..PARENT
     };
     let whole = measure(&parent);
@@ -242,7 +266,7 @@ fn uniform_rays_enter_boxes_by_area() {
 fn srdh_is_the_model_for_two_children() {
     use antumbra::parts::{ChildCost, cost_any};
     let mut rng = Rng::new(74);
-    let srdh = Srdh::new();
+    let srdh = SrdhCost::default();
     for _ in 0..1000 {
         let sides = [(); 2].map(|()| random_measure(&mut rng, &PARENT));
         let [left, right] = sides.map(|side| {
@@ -279,7 +303,7 @@ fn srdh_predicts_the_work_of_rays_drawn_from_its_model() {
             let share = |count: usize| (count as f64 / parent.entered as f64) as f32;
             (share(side.entered), share(side.hits))
         });
-        let srdh = Srdh::new();
+        let srdh = SrdhCost::default();
         let weights = sides.map(|side| srdh.child(&parent, &side).cost);
         let first = usize::from(srdh.right_first(&parent, &sides[0], &sides[1]));
         let mut work = 0.0;
@@ -313,38 +337,24 @@ fn seen_is_what_is_nearest() {
     let [object, world] = [(); 2].map(|()| mesh::soup(&mut rng, 200));
     let [object, world] =
         [&object, &world].map(|mesh| [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])]);
-    let instance = Instance {
-        object: 0,
-        transform: std::array::from_fn(|row| {
-            std::array::from_fn(|column| f32::from(u8::from(row == column)))
-        }),
-    };
-    let primitives =
-        Primitives::with_instances(&world, &[object], &[instance]).expect("indices in range");
-    let rays: Vec<_> = (0..300)
-        .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
-        .collect();
-    let tree = crate::tree::binary::BinaryTree::build(&primitives, Builder::BinnedSah);
+    let here =
+        std::array::from_fn(|row| std::array::from_fn(|column| f32::from(u8::from(row == column))));
+    let levels = [&world, &object].map(|list| Primitives::new(list).expect("indices in range"));
+    let primitives = Primitives::with_instances(&world, &[object], &[Instance::new(0, here)])
+        .expect("indices in range");
+    let rays = rays_between(&mut rng, 300);
+    let tree = BinaryTree::build(&primitives, Builder::BinnedSah);
     let mut seen = Seen::none(&primitives);
     seen.follow(&primitives, &tree, &rays);
-    for (primitives, seen) in [
-        (&primitives, &seen.world),
-        (&primitives.objects[0], &seen.objects[0]),
-    ] {
-        let mut expected = alloc::vec![false; primitives.len()];
-        for ray in &rays {
-            let setup = RaySetup::new(ray, 10.0).expect("a ray");
-            let hits = (0..primitives.len()).filter_map(|prim| {
-                let hit = primitives.hit(prim, &setup, QueryKind::Occluded)?;
-                primitives.instance(prim).is_none().then_some((hit.t, prim))
-            });
-            if let Some((_, prim)) = hits.min_by(|a, b| a.0.total_cmp(&b.0)) {
-                expected[prim] = true;
-            }
+    for (level, seen) in levels.iter().zip([&seen.world, &seen.objects[0]]) {
+        let brute = Brute::new(level);
+        let mut expected = vec![false; level.len()];
+        for hit in rays.iter().filter_map(|ray| brute.intersect(ray)) {
+            expected[hit.prim_id as usize] = true;
         }
         assert_eq!(seen, &expected);
         let count = seen.iter().filter(|seen| **seen).count();
-        assert!(count > 20 && count < primitives.len(), "{count}");
+        assert!(count > 20 && count < level.len(), "{count}");
     }
 }
 
