@@ -114,6 +114,7 @@ mod ray_columns;
 mod shape;
 mod trace;
 mod tree;
+mod words;
 
 pub use aabb::Aabb;
 pub use antumbra_simd::Isa;
@@ -223,7 +224,7 @@ pub mod parts {
     pub use crate::trace::observe::{Cost, NodeVisit, Observer, Place};
     pub use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
     pub use crate::tree::node::{ChildKind, Leaf, MAX_WIDTH, NodeRef, PerSlot};
-    pub use crate::tree::slot_order::SlotOrder;
+    pub use crate::tree::slot_order::{Pick, SlotOrder};
     pub use crate::tree::wide::Tree;
 }
 

@@ -6,9 +6,8 @@ use super::bvh::Bvh;
 use super::recipe::Recipe;
 use super::steps::Steps;
 use crate::learn::Log;
-use crate::order::AS_THEY_ARE;
 use crate::ray::Ray;
-use crate::tree::node::{Child, ChildKind};
+use crate::tree::node::{AS_THEY_ARE, Child, ChildKind};
 use crate::tree::wide::Tree;
 
 /// Nodes that fewer than one of this many rays visited are left out: they are many, and save next to nothing.

@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::geometry::instance::ObjectShape;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::{Functions, Geometry};
-use crate::tree::words::{Kind, Sink, Words};
+use crate::words::{Kind, Sink, Words};
 
 /// Geometry with its tree, built once and placed in any number of [worlds](crate::World), any number of times.
 ///

@@ -16,7 +16,7 @@ use crate::trace::memory::Pool;
 use crate::tree::validate::Walked;
 use crate::tree::wide::Tree;
 use crate::tree::width::Width;
-use crate::tree::words::{self, Kind, Sink, Words};
+use crate::words::{self, Kind, Sink, Words};
 
 /// What a file can hold: a [`Bvh`], an [`Object`] or a [`World`]. [`Functions::read`] returns any of them.
 ///

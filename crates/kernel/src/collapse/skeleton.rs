@@ -8,11 +8,11 @@ use core::ops::Range;
 use crate::geometry::primitives::Primitives;
 use crate::learn::tree_log::NodeCounts;
 use crate::order::ratio::{area_shares, cost_any, precise_chances};
-use crate::order::{AS_THEY_ARE, sorted_by_key};
+use crate::order::sorted_by_key;
 use crate::parallel;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 use crate::tree::costs::CostModel;
-use crate::tree::node::{MAX_WIDTH, PerSlot};
+use crate::tree::node::{AS_THEY_ARE, MAX_WIDTH, PerSlot};
 
 /// Subtrees of at most this many binary nodes are the work of one thread.
 const SEQUENTIAL: usize = 2048;

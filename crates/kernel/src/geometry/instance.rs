@@ -7,7 +7,7 @@ use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::geometry::primitives::Primitives;
 use crate::math;
-use crate::tree::words::{Sink, Words};
+use crate::words::{Sink, Words};
 
 /// One placement of an object; its place in the list given to the builder is the `inst_id`.
 ///

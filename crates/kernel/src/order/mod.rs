@@ -18,8 +18,8 @@ pub(crate) mod size;
 use crate::error::Error;
 use crate::learn::{Log, LogKind};
 use crate::tree::costs::CostModel;
-use crate::tree::node::{NodeRef, PerSlot};
-use crate::tree::slot_order::SlotOrder;
+use crate::tree::node::{AS_THEY_ARE, NodeRef, PerSlot};
+use crate::tree::slot_order::{Pick, SlotOrder};
 use crate::tree::wide::Tree;
 use antumbra_simd::{Row, named_list};
 
@@ -96,7 +96,7 @@ impl Properties {
     fn of(plan: &dyn Plan) -> Self {
         Self {
             log: plan.log(),
-            picks_by_ray: plan.picks_by_ray(),
+            picks_by_ray: plan.pick().is_some(),
         }
     }
 }
@@ -168,15 +168,10 @@ pub trait Plan: Row {
     /// What the log lacks. Builds return it, and [`Bvh::relearn`](crate::Bvh::relearn) panics.
     fn plan(&self, tree: &Tree, log: Option<&Log>, costs: &CostModel) -> Result<SlotOrder, Error>;
 
-    /// Whether [`Plan::sort_for_ray`] is called in every node. Occlusion queries then go ray by ray, and trees are saved
-    /// without it.
-    fn picks_by_ray(&self) -> bool {
-        false
+    /// What looks at the ray in every node, for an order that is no permutation of slots.
+    fn pick(&self) -> Option<&'static dyn Pick> {
+        None
     }
-
-    /// Sorts the lanes of a node that a ray hits so that the one to be visited first comes last. They ascend, that is, slots
-    /// descend. `entered` has the distance at which the box of each lane of the node is entered.
-    fn sort_for_ray(&self, _entered: &[f32], _lanes: &mut [u32]) {}
 }
 
 /// Computes an order for a tree whose slots are as its builder left them.
@@ -204,7 +199,7 @@ pub(crate) fn plan(
         Order::Visits => ratio::plan(tree, with_boxes()?, model, Estimate::Visited),
         Order::Joint => joint::plan(tree, needed()?, model),
         Order::Other(other) => other.plan(tree, log, model).map(|planned| SlotOrder {
-            pick: other.picks_by_ray().then_some(other),
+            pick: other.pick(),
             ..planned
         }),
     }
@@ -227,6 +222,3 @@ pub(crate) fn sorted_by_key(len: usize, key: &PerSlot<f64>, areas: &PerSlot<f32>
     });
     slots
 }
-
-/// Every slot in its place.
-pub(crate) const AS_THEY_ARE: PerSlot<u8> = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];

@@ -34,9 +34,9 @@ use alloc::vec::Vec;
 use crate::error::Error;
 use crate::geometry::BLOCK;
 use crate::learn::log::Log;
-use crate::order::{AS_THEY_ARE, sorted_slots};
+use crate::order::sorted_slots;
 use crate::tree::costs::CostModel;
-use crate::tree::node::{ChildKind, MAX_WIDTH, NodeRef, PerSlot};
+use crate::tree::node::{AS_THEY_ARE, ChildKind, MAX_WIDTH, NodeRef, PerSlot};
 use crate::tree::slot_order::SlotOrder;
 use crate::tree::wide::Tree;
 

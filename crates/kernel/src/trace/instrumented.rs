@@ -155,7 +155,7 @@ mod tests {
     use crate::tree::binary::BinaryTree;
     use crate::tree::costs::CostModel;
     use crate::tree::nodes::Nodes;
-    use crate::tree::slot_order::SlotOrder;
+    use crate::tree::slot_order::{self, SlotOrder};
     use crate::tree::wide::Tree;
     use crate::tree::width::Width as NodeWidth;
 
@@ -181,11 +181,13 @@ mod tests {
             Ok(SlotOrder::of_nothing(tree))
         }
 
-        fn picks_by_ray(&self) -> bool {
-            true
+        fn pick(&self) -> Option<&'static dyn slot_order::Pick> {
+            Some(&Farthest)
         }
+    }
 
-        fn sort_for_ray(&self, entered: &[f32], lanes: &mut [u32]) {
+    impl slot_order::Pick for Farthest {
+        fn sort(&self, entered: &[f32], lanes: &mut [u32]) {
             lanes.sort_by(|a, b| entered[*a as usize].total_cmp(&entered[*b as usize]));
         }
     }

@@ -150,10 +150,10 @@ impl Pick {
         let count = mask.compress(&all, &mut lanes);
         match (self, bvh.pick) {
             (Self::Shuffled(shuffle), _) => shuffle.shuffle(&mut lanes[..count]),
-            (Self::Rule, Some(plan)) => {
+            (Self::Rule, Some(pick)) => {
                 let mut entered = [0.0; N];
                 entry.store(&mut entered);
-                plan.sort_for_ray(&entered, &mut lanes[..count]);
+                pick.sort(&entered, &mut lanes[..count]);
             }
             _ => {}
         }

@@ -7,7 +7,7 @@
 //! - `validate`: a check of every promise of the wide tree;  `statistics`: its bytes and its cost
 //! - `width`: how many children a node has;  `any`: the switch between widths
 //! - `motion`: what moves between two keys
-//! - `saved`: trees as words;  `words`: the files that these words make
+//! - `saved`: trees as words of a file, see [`crate::words`]
 //! - `slot_order`: a permutation of the slots of a tree
 
 pub(crate) mod any;
@@ -25,4 +25,3 @@ mod statistics;
 pub(crate) mod validate;
 pub(crate) mod wide;
 pub(crate) mod width;
-pub(crate) mod words;

@@ -30,6 +30,9 @@ pub const MAX_WIDTH: usize = 16;
 /// Something for each slot of a node. Those beyond its width are of no meaning.
 pub type PerSlot<T> = [T; MAX_WIDTH];
 
+/// Every slot in its place.
+pub(crate) const AS_THEY_ARE: PerSlot<u8> = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15];
+
 /// Two values of the range of instances mean [`Child::EXIT`] and [`Child::DONE`].
 const _: () = assert!(Child::INSTANCE as usize + MAX_INSTANCES == Child::EXIT.0 as usize);
 

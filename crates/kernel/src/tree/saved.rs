@@ -1,4 +1,4 @@
-//! Trees as words of a file: see [`super::words`].
+//! Trees as words of a file: see [`crate::words`].
 //!
 //! Only what is there is written: occupied slots and lanes. Blocks and nodes are then made as a collapse makes them, so
 //! that their empty lanes keep their promises whatever a file says. [`Tree::walk`] checks the rest, with boxes
@@ -15,7 +15,6 @@ use super::nodes::Nodes;
 use super::validate::{LeafBoxes, Walked, block_box};
 use super::wide::{PlacedTree, Tree};
 use super::width::Width;
-use super::words::{Sink, Words};
 use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::geometry::cutout::micromap::MapRef;
@@ -30,6 +29,7 @@ use crate::geometry::scalar::{ScalarBlock, ScalarPrim};
 use crate::geometry::triangle::TriangleBlock;
 use crate::geometry::user::UserPrim;
 use crate::geometry::{BLOCK, PrimRef};
+use crate::words::{Sink, Words};
 
 /// Words behind a node without children, which is room for others: so that a file is never much smaller than its tree.
 const EMPTY_NODE: usize = 7;

@@ -2,12 +2,35 @@
 
 use alloc::vec;
 use alloc::vec::Vec;
+use core::fmt;
 
-use super::node::PerSlot;
+use super::node::{AS_THEY_ARE, PerSlot};
 use super::wide::Tree;
 use crate::geometry::BLOCK;
-use crate::order::{AS_THEY_ARE, Plan};
 use crate::shape::Shape;
+
+/// A choice among the children of a node that looks at the ray, in place of the order of slots. Occlusion queries of a tree
+/// that has one go ray by ray, and the tree is saved without it.
+pub trait Pick: Send + Sync {
+    /// Sorts the lanes of a node that a ray hits so that the one to be visited first comes last. They ascend, that is, slots
+    /// descend. `entered` has the distance at which the box of each lane of the node is entered.
+    fn sort(&self, entered: &[f32], lanes: &mut [u32]);
+}
+
+impl fmt::Debug for dyn Pick {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Pick")
+    }
+}
+
+/// One choice is the same as another if it is the same value in memory.
+impl PartialEq for dyn Pick {
+    fn eq(&self, other: &Self) -> bool {
+        core::ptr::addr_eq(self, other)
+    }
+}
+
+impl Eq for dyn Pick {}
 
 /// A permutation of the slots of every node, and of the primitives of every leaf.
 ///
@@ -20,8 +43,8 @@ pub struct SlotOrder {
     pub(crate) slots: Vec<u8>,
     /// Per leaf: which lane moves to this place. Empty: leave the leaves as they are.
     pub(crate) lanes: Vec<[u8; BLOCK]>,
-    /// The order itself, if it looks at the ray in every node.
-    pub(crate) pick: Option<&'static dyn Plan>,
+    /// What looks at the ray in every node, if anything does.
+    pub(crate) pick: Option<&'static dyn Pick>,
 }
 
 impl SlotOrder {

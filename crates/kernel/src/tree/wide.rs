@@ -8,13 +8,12 @@ use core::ops::Deref;
 use crate::aabb::Aabb;
 use crate::geometry::cutout::Filters;
 use crate::geometry::instance::Placement;
-use crate::order::Plan;
 use crate::shape::Shape;
 use crate::tree::leaves::LeafBlocks;
 use crate::tree::motion::Motion;
 use crate::tree::node::{Node, NodeRef};
 use crate::tree::nodes::Nodes;
-use crate::tree::slot_order::{SlotOrder, occupied_first};
+use crate::tree::slot_order::{Pick, SlotOrder, occupied_first};
 use crate::tree::width::Width;
 
 /// A tree of nodes with as many children, or one tree over the world and one for each object that instances place
@@ -39,8 +38,8 @@ pub struct Tree {
     pub(crate) reach: f32,
     /// Levels of nodes, the root being one: the levels of the world's tree and of the deepest object together.
     pub(crate) depth: usize,
-    /// The order that looks at the ray in every node; `None` where occlusion queries visit slots in their order.
-    pub(crate) pick: Option<&'static dyn Plan>,
+    /// What looks at the ray in every node; `None` where occlusion queries visit slots in their order.
+    pub(crate) pick: Option<&'static dyn Pick>,
     /// Motion during a span, if anything moves. Nodes and leaves are then at the start of the span.
     pub(crate) motion: Option<Arc<Motion>>,
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity};
 use antumbra::parts::{
-    BinaryKind, BinaryNode, BinaryTree, Grow, Learning, Log, Plan, SlotOrder, Steps, Tree, TreeLog,
-    binned_subtree,
+    BinaryKind, BinaryNode, BinaryTree, Grow, Learning, Log, Pick, Plan, SlotOrder, Steps, Tree,
+    TreeLog, binned_subtree,
 };
 use antumbra::recipe::{Builder, Collapse, CostModel, Order, Preset};
 use antumbra::{
@@ -153,11 +153,13 @@ impl Plan for Nearest {
         Ok(SlotOrder::of_nothing(tree))
     }
 
-    fn picks_by_ray(&self) -> bool {
-        true
+    fn pick(&self) -> Option<&'static dyn Pick> {
+        Some(&Nearest)
     }
+}
 
-    fn sort_for_ray(&self, entered: &[f32], lanes: &mut [u32]) {
+impl Pick for Nearest {
+    fn sort(&self, entered: &[f32], lanes: &mut [u32]) {
         lanes.sort_by(|a, b| entered[*b as usize].total_cmp(&entered[*a as usize]));
     }
 }

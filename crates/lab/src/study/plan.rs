@@ -414,8 +414,8 @@ fn base_of<T: Copy + Default + PartialEq>(list: &[T]) -> T {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use antumbra_trees::{BUILDERS, COLLAPSES};
     use antumbra_scene::builtin;
+    use antumbra_trees::{BUILDERS, COLLAPSES};
     use std::collections::HashSet;
 
     #[test]

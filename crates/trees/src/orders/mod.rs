@@ -5,7 +5,7 @@ mod random;
 mod rtsah;
 
 use antumbra::Error;
-use antumbra::parts::{Log, Plan, SlotOrder, Tree};
+use antumbra::parts::{Log, Pick, Plan, SlotOrder, Tree};
 use antumbra::recipe::{CostModel, Order, UnknownName};
 
 use crate::{find, rows};
@@ -63,13 +63,15 @@ impl Plan for Ftob {
         Ok(SlotOrder::of_nothing(tree))
     }
 
-    fn picks_by_ray(&self) -> bool {
-        true
+    fn pick(&self) -> Option<&'static dyn Pick> {
+        Some(&Ftob)
     }
+}
 
+impl Pick for Ftob {
     /// Boxes that are entered behind the origin count as entered there. Of boxes entered at one distance the lower slot, which
     /// is the upper lane, comes first.
-    fn sort_for_ray(&self, entered: &[f32], lanes: &mut [u32]) {
+    fn sort(&self, entered: &[f32], lanes: &mut [u32]) {
         let distance = |lane: &u32| entered[*lane as usize].max(0.0);
         // Stable, and lanes ascend: equal ones stay so.
         lanes.sort_by(|a, b| distance(b).total_cmp(&distance(a)));

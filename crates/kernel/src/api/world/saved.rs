@@ -17,7 +17,7 @@ use crate::tree::node::{ChildKind, Leaf};
 use crate::tree::refit::TreePlaces;
 use crate::tree::validate::Walked;
 use crate::tree::wide::Tree;
-use crate::tree::words::{Kind, Sink, Words};
+use crate::words::{Kind, Sink, Words};
 
 impl Contents for World {
     const KIND: Kind = Kind::World;

@@ -6,7 +6,7 @@ use super::{Filters, MeshFilter, Representative};
 use crate::error::Error;
 use crate::geometry::PrimRef;
 use crate::geometry::functions::{Functions, GeometryId};
-use crate::tree::words::{Sink, Words};
+use crate::words::{Sink, Words};
 
 impl Filters {
     pub fn write(&self, sink: &mut Sink<'_>) {

@@ -4,9 +4,8 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use super::passage::Passage;
-use crate::order::AS_THEY_ARE;
 use crate::order::arrange::{Costs, EXACT, arrange};
-use crate::tree::node::{MAX_WIDTH, PerSlot};
+use crate::tree::node::{AS_THEY_ARE, MAX_WIDTH, PerSlot};
 
 /// The order in which children that occlude any ray come first, as is cheapest, and the others follow in the order of
 /// `ratio`.
