@@ -266,7 +266,7 @@ def baked(of):
     yield BAKING, f"{own['different_rays']} rays of {spaced(own['rays'])} differ in all"
     yield BAKING, f"{same['different_rays']} rays of {spaced(same['rays'])} have other answers"
     yield BAKING, f"Four scans of {spaced(ao['triangles'])} triangles, {ao['samples']} samples at each of {spaced(ao['vertices'])} vertices"
-    with open(os.path.join(ROOT, "crates/bake/tests/reference/sun.csv")) as file:
+    with open(os.path.join(ROOT, "crates/bake/tests/all/reference/sun.csv")) as file:
         sensors = [line.split(",") for line in file.read().split("surface")[0].splitlines()[2:]]
     hours = sum(int(row[1]) for row in sensors)
     yield BAKING, f"hours of sun, {len(sensors)} sensors together | | {spaced(hours)} | 1 hour"
@@ -420,10 +420,10 @@ SOURCES = {
         ("take 6 minutes of CPU time", "bench/record/zen3-2026-11-26-sun.csv", "1106533,4446,2534133667,1.18,359.13"),
         ("each within 22.5 degrees", "defined"),
         ("the angle to less than 0.001 degrees", "crates/bake/src/horizon_angles.rs", "in which the horizon is, to less than 0.001 degrees"),
-        ("| diffuse, level ground, kWh/m² | 219.04 | 219.04 | 0.00 % |", "crates/bake/tests/reference/sun.csv", "up,219.0351"),
-        ("| diffuse, south wall | 199.49 | 200.43 | -0.47 % |", "crates/bake/tests/reference/sun.csv", "south,200.4296"),
-        ("| 121.18, 125.03, 85.04 | 121.27, 125.17, 85.05 | -0.12 % at most |", "crates/bake/tests/reference/sun.csv", "west,125.1740"),
-        ("| 0.05 % at most |", "crates/bake/tests/reference.rs", "(direct / expected[1] - 1.0).abs() < 5e-4"),
+        ("| diffuse, level ground, kWh/m² | 219.04 | 219.04 | 0.00 % |", "crates/bake/tests/all/reference/sun.csv", "up,219.0351"),
+        ("| diffuse, south wall | 199.49 | 200.43 | -0.47 % |", "crates/bake/tests/all/reference/sun.csv", "south,200.4296"),
+        ("| 121.18, 125.03, 85.04 | 121.27, 125.17, 85.05 | -0.12 % at most |", "crates/bake/tests/all/reference/sun.csv", "west,125.1740"),
+        ("| 0.05 % at most |", "crates/bake/tests/all/reference.rs", "(direct / expected[1] - 1.0).abs() < 5e-4"),
         ("Howell, Menguc and Siegel, equation 4.14", "cited"),
         ("catalogue to 1e-3 with 262 144 samples", "crates/bake/src/view_factors.rs", "error < 1e-3"),
     ],

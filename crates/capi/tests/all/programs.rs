@@ -1,12 +1,9 @@
 //! Programs in C and C++ that are compiled with all warnings, linked with the static library and run: each checks answers
 //! and exits with 0 if all is right.
-#![cfg(unix)]
-
-mod support;
 
 use std::process::Command;
 
-use support::{Language, PROGRAM_WARNINGS, build, compiles, here, run};
+use crate::support::{Language, PROGRAM_WARNINGS, build, compiles, here, run};
 
 /// Builds and runs a program of `tests/` with a folder of its own as its argument.
 fn program(language: Language, name: &str) {

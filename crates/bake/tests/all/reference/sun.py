@@ -1,4 +1,4 @@
-"""Sun and sky by other programs: writes sun.csv, which tests/reference.rs compares with ours.
+"""Sun and sky by other programs: writes sun.csv, which tests/all/reference.rs compares with ours.
 
     pip install numpy pandas pvlib pyradiance
     python sun.py > sun.csv

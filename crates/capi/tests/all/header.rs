@@ -1,12 +1,11 @@
 //! The header declares what the library has: functions, structures, numbers.
 
-mod support;
-
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::mem::offset_of;
 use std::process::Command;
 
+use crate::support::{Language, build, here, run, static_library};
 use antumbra::{Hit, PrimId, Ray};
 use antumbra_capi::batch::BatchOptions;
 use antumbra_capi::build::BuildOptions;
@@ -20,7 +19,6 @@ use antumbra_capi::single::Surface;
 use antumbra_capi::status::Status;
 use antumbra_capi::tree::Report;
 use antumbra_capi::world::Placed;
-use support::{Language, here, run};
 
 fn header() -> String {
     let text = std::fs::read_to_string(here().join("include/antumbra.h")).expect("the header");
@@ -93,7 +91,7 @@ fn functions_are_declared_and_defined() {
 /// What the shared library exports, if there is `nm` and a library.
 #[test]
 fn the_library_exports_what_is_declared() {
-    let library = support::static_library().with_file_name("libantumbra_capi.so");
+    let library = static_library().with_file_name("libantumbra_capi.so");
     let Ok(symbols) = Command::new("nm")
         .args(["-D", "--defined-only"])
         .arg(&library)
@@ -237,7 +235,7 @@ fn structures_have_the_same_layout() {
         folder.path().join("layouts"),
     );
     std::fs::write(&file, source).expect("written");
-    if support::build(Language::C99, &file, &program, &[]).is_some() {
+    if build(Language::C99, &file, &program, &[]).is_some() {
         assert_eq!(run(&mut Command::new(program)), expected);
     }
 }

@@ -1,5 +1,5 @@
 //! Compilers of C and C++, and the static library that this test was built with.
-#![allow(dead_code, reason = "not every test uses all of it")]
+#![allow(dead_code, reason = "programs run on Unix only")]
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
