@@ -10,6 +10,7 @@
 //! - [`picture`]: PNG files
 //! - [`mod@mutate`]: damaged copies of files
 //! - [`mod@permutations`]: every order of a few items
+//! - [`sample`]: some of the combinations of several lists
 //!
 //! # Example
 //!
@@ -32,6 +33,7 @@ pub mod permutations;
 pub mod picture;
 pub mod rays;
 pub mod rng;
+pub mod sample;
 
 pub use mesh::Mesh;
 pub use mutate::mutate;
