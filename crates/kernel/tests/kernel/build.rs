@@ -3,9 +3,10 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use crate::support::{BUILDERS, builders_and_widths, equals_brute_by_builders, geometry};
+use crate::support::{BUILDERS, equals_brute_by, geometry, ways};
 use antumbra::recipe::{Builder, Clock, Collapse};
 use antumbra::{Bvh, Error, Geometry, Primitives, Ray, Recipe, Sphere, Width};
+use antumbra_testkit::sample::{pairs, triples};
 use antumbra_testkit::{Rng, mesh};
 
 #[test]
@@ -77,7 +78,7 @@ fn every_primitive_is_in_the_tree() {
     for generate in mesh::ALL {
         for size in [0, 1, 2, 7, 8, 9, 100, 3000] {
             let mesh = generate(&mut rng, size.max(1));
-            for (builder, width) in builders_and_widths() {
+            for (builder, width) in pairs(rng.bits(), &BUILDERS, &Width::ALL) {
                 let options = Recipe::default().builder(builder).width(width);
                 let bvh = Bvh::build(&[geometry(&mesh)], &options).expect("indices in range");
                 bvh.validate()
@@ -215,32 +216,36 @@ fn every_builder_takes_any_input() {
     let flat = soup.map("flat", |[x, y, _]| [x, y, -0.0]);
     let line = soup.map("line", |[x, _, _]| [x, x, x]);
     let coincident = mesh::coincident(&mut rng, 200);
-    for mesh in [spoiled, huge, tiny, flat, line, coincident] {
-        for size in [0.0, 1.0, 1e19, f32::NAN] {
-            let spheres = (0..20).map(|_| Sphere {
-                center: rng.point(size),
-                radius: 0.1 * size,
-            });
-            let geometries = [
-                geometry(&mesh),
-                Geometry::spheres(spheres.collect::<Vec<_>>()),
-            ];
-            let primitives = Primitives::new(&geometries).expect("indices in range");
-            let rays: Vec<_> = (0..200)
-                .map(|_| Ray::new(rng.point(1.5), rng.direction()))
-                .collect();
-            equals_brute_by_builders(mesh.name, &primitives, &rays);
-        }
+    let meshes = [spoiled, huge, tiny, flat, line, coincident];
+    let inputs: Vec<_> = meshes
+        .iter()
+        .flat_map(|mesh| [0.0, 1.0, 1e19, f32::NAN].map(|size| (mesh, size)))
+        .collect();
+    let trees = pairs(0, &BUILDERS, &Collapse::ALL);
+    for ((mesh, size), (builder, collapse), way) in triples(0, &inputs, &trees, &ways()) {
+        let spheres = (0..20).map(|_| Sphere {
+            center: rng.point(size),
+            radius: 0.1 * size,
+        });
+        let geometries = [
+            geometry(mesh),
+            Geometry::spheres(spheres.collect::<Vec<_>>()),
+        ];
+        let primitives = Primitives::new(&geometries).expect("indices in range");
+        let rays: Vec<_> = (0..200)
+            .map(|_| Ray::new(rng.point(1.5), rng.direction()))
+            .collect();
+        equals_brute_by(builder, collapse, way, mesh.name, &primitives, &rays);
     }
 }
 
 #[test]
 fn builders_are_known_by_their_names() {
-    for builder in Builder::ALL {
+    for builder in BUILDERS {
         assert_eq!(builder.name().parse(), Ok(builder));
     }
     let error = "lego".parse::<Builder>().expect_err("no such builder");
-    for builder in Builder::ALL {
+    for builder in BUILDERS {
         assert!(error.to_string().contains(builder.name()), "{error}");
     }
 }

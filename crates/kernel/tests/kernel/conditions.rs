@@ -11,7 +11,7 @@ use antumbra_testkit::{Rng, mesh};
 use proptest::prelude::*;
 
 use crate::instances::Scene;
-use crate::support::{Stripes, bits, cases, cutouts, for_every_tree, geometry, square};
+use crate::support::{Stripes, bits, config, cutouts, for_every_tree, geometry, square};
 use crate::transforms::translation;
 
 /// Masks of which some bits are missing, for some of what there is.
@@ -146,7 +146,7 @@ fn check_surface(bvh: &Bvh, ray: &Ray, surface: Option<&Surface>, answers: &Answ
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(3), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(config(3))]
 
     /// Scenes with all kinds of geometry, instances, masks, exclusions and functions, one by one and in batches.
     #[test]

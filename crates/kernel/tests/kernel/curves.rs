@@ -8,7 +8,7 @@ use antumbra_testkit::{Rng, mesh, rays};
 use proptest::prelude::*;
 
 use crate::support::{
-    bits, cases, equals_brute, equals_brute_by_builders, for_every_tree, geometry, kernel_rays,
+    bits, config, equals_brute, equals_brute_by_builders, for_every_tree, geometry, kernel_rays,
 };
 use crate::transforms::{transform, translation};
 
@@ -65,7 +65,7 @@ fn rays_around(rng: &mut Rng, curves: &Curves<'_>, count: usize) -> Vec<Ray> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(4), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(config(4))]
 
     /// Among triangles and spheres, in the world and in instances of any transform, by every query.
     #[test]

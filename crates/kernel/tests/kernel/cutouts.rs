@@ -6,11 +6,12 @@ use antumbra::cutout::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 use antumbra::parts::{BinaryTree, Learning, LogKind, Steps, TreeLog};
 use antumbra::recipe::{Builder, Collapse};
 use antumbra::{Brute, Bvh, Geometry, Instance, Isa, Primitives, Ray, Sphere, Width};
+use antumbra_testkit::sample::pairs;
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 
 use crate::support::{
-    bits, brute, builders_and_widths, cutouts, equals_brute, geometry, kernel_rays, square, upwards,
+    bits, brute, config, cutouts, equals_brute, geometry, kernel_rays, square, upwards, ways,
 };
 
 /// Fields of a checkerboard over (u, v) per unit.
@@ -127,7 +128,7 @@ fn count_occluded(geometries: &[Geometry<'_>], rays: &[Ray]) -> usize {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: crate::support::cases(4), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(config(4))]
 
     #[test]
     fn every_tree_equals_brute_force(seed: u64) {
@@ -183,23 +184,21 @@ fn learned_trees_equal_brute_force() {
     let primitives = Primitives::new(&geometries).expect("indices in range");
     let brute = Brute::new(&primitives);
     let rays = kernel_rays(&rays::around(&mut rng, &opaque, 400));
-    for (builder, width) in builders_and_widths() {
+    for (builder, (width, isa)) in pairs(seed, &Builder::ALL, &ways()) {
         let tree = BinaryTree::build(&primitives, builder);
         let mut log = TreeLog::new(&tree);
         log.add(&primitives, &tree, &rays, 1.0);
-        for isa in Isa::available() {
-            let learning = Learning::default();
-            let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
-            bvh.validate().expect("a valid tree");
-            let mut occluded = vec![false; rays.len()];
-            let mut hits = vec![None; rays.len()];
-            bvh.occluded_batch(&rays, &mut occluded);
-            bvh.intersect_batch(&rays, &mut hits);
-            for (index, ray) in rays.iter().enumerate() {
-                let place = format!("seed {seed} {builder} x{width} {} {ray:?}", isa.level());
-                assert_eq!(occluded[index], brute.occluded(ray), "{place}");
-                assert_eq!(bits(hits[index]), bits(brute.intersect(ray)), "{place}");
-            }
+        let learning = Learning::default();
+        let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
+        bvh.validate().expect("a valid tree");
+        let mut occluded = vec![false; rays.len()];
+        let mut hits = vec![None; rays.len()];
+        bvh.occluded_batch(&rays, &mut occluded);
+        bvh.intersect_batch(&rays, &mut hits);
+        for (index, ray) in rays.iter().enumerate() {
+            let place = format!("seed {seed} {builder} x{width} {} {ray:?}", isa.level());
+            assert_eq!(occluded[index], brute.occluded(ray), "{place}");
+            assert_eq!(bits(hits[index]), bits(brute.intersect(ray)), "{place}");
         }
     }
 }

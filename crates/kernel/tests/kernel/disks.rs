@@ -10,7 +10,7 @@ use antumbra_testkit::{Rng, mesh, rays};
 use proptest::prelude::*;
 
 use crate::support::{
-    Odd, Stripes, bits, cases, cutouts, equals_brute, equals_brute_by_builders, for_every_tree,
+    Odd, Stripes, bits, config, cutouts, equals_brute, equals_brute_by_builders, for_every_tree,
     geometry, kernel_rays,
 };
 use crate::transforms::{IDENTITY, scale, transform, translation};
@@ -62,7 +62,7 @@ fn rays_around(rng: &mut Rng, disks: &[Disk], count: usize) -> Vec<Ray> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(4), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(config(4))]
 
     /// Among primitives of every other kind, in the world and in instances of any transform, by every query.
     #[test]

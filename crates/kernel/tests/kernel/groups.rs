@@ -1,9 +1,10 @@
 //! Groups: rays of many points in the same directions have the answers of single rays, in every tree and level.
 
-use antumbra::{Bvh, Directions, Instance, Isa, Primitives, Ray, Recipe, Width};
+use antumbra::{Bvh, Directions, Instance, Primitives, Ray, Recipe, Width};
+use antumbra_testkit::sample::pairs;
 use antumbra_testkit::{Rng, mesh};
 
-use crate::support::{cases, geometry};
+use crate::support::{cases, geometry, ways};
 
 /// Suns of some days, directions all around, and some that no ray can have.
 fn directions(rng: &mut Rng) -> Vec<[f32; 3]> {
@@ -108,24 +109,20 @@ impl Case {
     }
 }
 
-/// Eight cases are more than a hundred million rays.
+/// Eight cases of all widths and levels are more than a hundred million rays.
 #[test]
 fn rays_of_a_group_have_the_answers_of_single_rays() {
     let (mut rng, rounds) = (Rng::new(33), cases(1));
     let mut traced = 0;
-    for generate in (0..rounds).flat_map(|_| mesh::ALL) {
+    let meshes = (0..rounds).flat_map(|round| pairs(round.into(), mesh::ALL, &ways()));
+    for (generate, (width, isa)) in meshes {
         let mesh = generate(&mut rng, 300);
         let case = Case::new(&mut rng, &mesh.positions);
         let given = directions(&mut rng);
-        for width in Width::ALL {
-            let recipe = Recipe::default().width(width);
-            let mut bvh = Bvh::build(&[geometry(&mesh)], &recipe).expect("a mesh");
-            for isa in Isa::available() {
-                bvh.set_isa(isa);
-                let place = format!("{} x{width} {}", mesh.name, isa.level());
-                traced += case.check(&bvh, &given, &place);
-            }
-        }
+        let recipe = Recipe::default().width(width).isa(isa);
+        let bvh = Bvh::build(&[geometry(&mesh)], &recipe).expect("a mesh");
+        let place = format!("{} x{width} {}", mesh.name, isa.level());
+        traced += case.check(&bvh, &given, &place);
     }
     println!("{traced} rays");
     assert!(traced > 100_000 * rounds as usize, "{traced}");

@@ -1,16 +1,15 @@
 //! Scenes on two levels: every tree, order and level against brute force, and against flattened geometry.
 
 use crate::support::{
-    BUILDERS, Odd, builders_and_collapses, builders_and_widths, for_every_tree, geometry,
-    kernel_rays, quads,
+    BUILDERS, Odd, collapses, config, for_every_tree, geometry, kernel_rays, quads, ways,
 };
 use crate::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
 use antumbra::parts::{BinaryTree, Learning, Steps, TreeLog, surface_rays};
 use antumbra::recipe::{Builder, Collapse};
 use antumbra::{
-    Brute, Bvh, Error, Geometry, Hit, INVALID_ID, Instance, Isa, Primitives, Ray, Recipe, Sphere,
-    Width,
+    Brute, Bvh, Error, Geometry, Hit, INVALID_ID, Instance, Primitives, Ray, Recipe, Sphere, Width,
 };
+use antumbra_testkit::sample::{pairs, triples};
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 
@@ -197,7 +196,7 @@ impl Expected {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: crate::support::cases(8), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(config(8))]
 
     #[test]
     fn every_tree_equals_brute_force(seed: u64) {
@@ -219,28 +218,17 @@ proptest! {
         let primitives = scene.primitives();
         let rays = scene.rays(&mut rng, 150);
         let expected = Expected::new(&primitives, &rays, &format!("seed {seed}"));
-        for (builder, collapse) in builders_and_collapses() {
+        let trees = triples(seed, &BUILDERS, &collapses(), &ways());
+        for (builder, (collapse, sort), (width, isa)) in trees {
             let tree = BinaryTree::build(&primitives, builder);
             let mut log = TreeLog::new(&tree);
             log.add(&primitives, &tree, &rays[..75], 100.0);
             log.add(&primitives, &tree, &surface_rays(&primitives, 100, seed), 100.0);
-                for (sort, width) in [false, true]
-                    .into_iter()
-                    .flat_map(|sort| Width::ALL.map(|width| (sort, width)))
-                {
-                    let learning = Learning { collapse, sort, ..Default::default() };
-                    let mut bvh = Bvh::collapse_logged(
-                        &primitives, &tree, &log, &learning, width, Isa::best(),
-                    );
-                    for isa in Isa::available() {
-                        bvh.set_isa(isa);
-                        let level = isa.level();
-                        let place = format!(
-                            "seed {seed} {builder} {collapse} sorted {sort} x{width} {level}"
-                        );
-                        expected.check(&bvh, &rays, &place);
-                    }
-                }
+            let learning = Learning { collapse, sort, ..Default::default() };
+            let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
+            let level = isa.level();
+            let place = format!("seed {seed} {builder} {collapse} sorted {sort} x{width} {level}");
+            expected.check(&bvh, &rays, &place);
         }
     }
 }
@@ -297,13 +285,10 @@ fn intervals_that_end_at_a_hit_are_exact() {
         }
         let place = format!("seed {seed} round {round}");
         let expected = Expected::new(&primitives, &rays, &place);
-        for width in Width::ALL {
-            let tree = BinaryTree::build(&primitives, Builder::default());
-            let mut bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, Isa::best());
-            for isa in Isa::available() {
-                bvh.set_isa(isa);
-                expected.check(&bvh, &rays, &format!("{place} x{width} {}", isa.level()));
-            }
+        let tree = BinaryTree::build(&primitives, Builder::default());
+        for (width, isa) in ways() {
+            let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, isa);
+            expected.check(&bvh, &rays, &format!("{place} x{width} {}", isa.level()));
         }
     }
 }
@@ -341,14 +326,11 @@ fn clamped_hits_are_ranked_alike_by_every_tree() {
         let expected = Expected::new(&primitives, &rays, &place);
         let hits = expected.hits.iter().flatten().count();
         assert!(hits > 50, "{place}: {hits} hits");
-        for (builder, width) in builders_and_widths() {
+        for (builder, (width, isa)) in pairs(round, &BUILDERS, &ways()) {
             let tree = BinaryTree::build(&primitives, builder);
-            let mut bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, Isa::best());
-            for isa in Isa::available() {
-                bvh.set_isa(isa);
-                let level = isa.level();
-                expected.check(&bvh, &rays, &format!("{place} {builder} x{width} {level}"));
-            }
+            let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, isa);
+            let level = isa.level();
+            expected.check(&bvh, &rays, &format!("{place} {builder} x{width} {level}"));
         }
     }
 }

@@ -1,10 +1,11 @@
 //! Trees learned from logs: the same answers as ever, lower costs, and no harm to rays of another kind
 //! when the log is mixed.
 
-use crate::support::{BY_RAY, builders_and_collapses, geometry, kernel_rays};
+use crate::support::{BUILDERS, BY_RAY, collapses, geometry, kernel_rays, ways};
 use antumbra::parts::{BinaryTree, Cost, Learning, Steps, TreeLog, surface_rays};
 use antumbra::recipe::{Builder, Collapse, CostModel, Order};
 use antumbra::{Brute, Bvh, Geometry, Isa, Primitives, Ray, Recipe, Sphere, Width};
+use antumbra_testkit::sample::triples;
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 
 fn log(primitives: &Primitives, tree: &BinaryTree, kinds: &[&[Ray]]) -> TreeLog {
@@ -48,43 +49,35 @@ fn learned_trees_equal_brute_force() {
         let occluded: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
         let hits: Vec<_> = rays.iter().map(|ray| brute.intersect(ray)).collect();
         let expected = (occluded, hits);
-        for (builder, collapse) in builders_and_collapses() {
+        let trees = triples(rng.bits(), &BUILDERS, &collapses(), &ways());
+        for (builder, (collapse, sort), (width, isa)) in trees {
             let tree = BinaryTree::build(&primitives, builder);
             let log = log(&primitives, &tree, &[&rays[..200]]);
-            for (sort, width) in [false, true]
-                .into_iter()
-                .flat_map(|sort| Width::ALL.map(|width| (sort, width)))
-            {
-                let learning = Learning {
-                    collapse,
-                    sort,
-                    ..Default::default()
-                };
-                let mut bvh =
-                    Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, Isa::best());
-                for isa in Isa::available() {
-                    bvh.set_isa(isa);
-                    let place = format!(
-                        "seed {seed} {} {builder} {collapse} sorted {sort} x{width} {}",
-                        mesh.name,
-                        isa.level()
-                    );
-                    bvh.validate()
-                        .unwrap_or_else(|broken| panic!("{place}: {broken}"));
-                    let mut found = (vec![false; rays.len()], vec![None; rays.len()]);
-                    bvh.occluded_batch(&rays, &mut found.0);
-                    bvh.intersect_batch(&rays, &mut found.1);
-                    assert!(found == expected, "{place}");
-                }
-                for order in [Order::Sato, Order::Embree, BY_RAY] {
-                    let plan = bvh.plan(order, None, &learning.model).expect("no log");
-                    let mut bvh = bvh.clone();
-                    bvh.apply(&plan);
-                    bvh.validate().expect("a valid tree");
-                    let mut found = vec![false; rays.len()];
-                    bvh.occluded_batch(&rays, &mut found);
-                    assert!(found == expected.0, "{} {order}", mesh.name);
-                }
+            let learning = Learning {
+                collapse,
+                sort,
+                ..Default::default()
+            };
+            let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
+            let place = format!(
+                "seed {seed} {} {builder} {collapse} sorted {sort} x{width} {}",
+                mesh.name,
+                isa.level()
+            );
+            bvh.validate()
+                .unwrap_or_else(|broken| panic!("{place}: {broken}"));
+            let mut found = (vec![false; rays.len()], vec![None; rays.len()]);
+            bvh.occluded_batch(&rays, &mut found.0);
+            bvh.intersect_batch(&rays, &mut found.1);
+            assert!(found == expected, "{place}");
+            for order in [Order::Sato, Order::Embree, BY_RAY] {
+                let plan = bvh.plan(order, None, &learning.model).expect("no log");
+                let mut bvh = bvh.clone();
+                bvh.apply(&plan);
+                bvh.validate().expect("a valid tree");
+                let mut found = vec![false; rays.len()];
+                bvh.occluded_batch(&rays, &mut found);
+                assert!(found == expected.0, "{place} {order}");
             }
         }
     }

@@ -2,13 +2,15 @@
 
 use std::sync::Arc;
 
+use antumbra::recipe::Preset;
 use antumbra::{
     Brute, Bvh, Error, Geometry, Motion, MovingBvh, MovingGeometry, MovingInstance, MovingMesh,
-    MovingScene, Ray, Recipe, Sphere, Width,
+    MovingScene, Ray, Recipe, Sphere,
 };
+use antumbra_testkit::sample::pairs;
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 
-use super::support::{Stripes, cases, cutouts, kernel_rays, quads};
+use super::support::{Stripes, cases, cutouts, kernel_rays, quads, ways};
 use super::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
 
 /// A mesh whose keys are the mesh, moved and bent.
@@ -41,32 +43,21 @@ fn check(scene: &MovingScene<'_>, rng: &mut Rng, rays: &[Ray], what: &str) -> [u
         }
     }
     let occluded: Vec<bool> = expected.iter().map(Option::is_some).collect();
-    for recipe in [Recipe::default(), Recipe::fast()] {
-        for width in Width::ALL {
-            let bvh = MovingBvh::build(scene, &recipe.width(width)).expect("checked");
-            bvh.validate().expect("valid");
-            for isa in antumbra::Isa::available() {
-                let mut bvh = bvh.clone();
-                bvh.set_isa(isa);
-                let what = format!("{what}, {width:?}, {}", isa.level());
-                let (mut hits, mut shadows) = (vec![None; rays.len()], vec![false; rays.len()]);
-                bvh.intersect_batch(rays, &times, &mut hits);
-                bvh.occluded_batch(rays, &times, &mut shadows);
-                assert!(hits == expected, "{what}: hits of a batch");
-                assert!(shadows == occluded, "{what}: occlusion of a batch");
-                for (index, ray) in rays.iter().enumerate() {
-                    assert_eq!(
-                        bvh.intersect(ray, times[index]),
-                        expected[index],
-                        "{what}: {ray:?}"
-                    );
-                    assert_eq!(
-                        bvh.occluded(ray, times[index]),
-                        occluded[index],
-                        "{what}: {ray:?}"
-                    );
-                }
-            }
+    let presets = [Preset::Default, Preset::Fast];
+    for (preset, (width, isa)) in pairs(rng.bits(), &presets, &ways()) {
+        let recipe = preset.recipe().width(width);
+        let mut bvh = MovingBvh::build(scene, &recipe).expect("checked");
+        bvh.validate().expect("valid");
+        bvh.set_isa(isa);
+        let what = format!("{what}, {preset} x{width} {}", isa.level());
+        let (mut hits, mut shadows) = (vec![None; rays.len()], vec![false; rays.len()]);
+        bvh.intersect_batch(rays, &times, &mut hits);
+        bvh.occluded_batch(rays, &times, &mut shadows);
+        assert!(hits == expected, "{what}: hits of a batch");
+        assert!(shadows == occluded, "{what}: occlusion of a batch");
+        for (index, (ray, &time)) in rays.iter().zip(&times).enumerate() {
+            assert_eq!(bvh.intersect(ray, time), expected[index], "{what}: {ray:?}");
+            assert_eq!(bvh.occluded(ray, time), occluded[index], "{what}: {ray:?}");
         }
     }
     let hits = occluded.iter().filter(|&&hit| hit).count();

@@ -1,7 +1,7 @@
 //! Every builder x width x order x level equals brute force, ray by ray, bit for bit, on geometry nice
 //! and nasty.
 
-use crate::support::{Odd, equals_brute, for_every_tree, geometry, kernel_rays, quads};
+use crate::support::{Odd, config, equals_brute, for_every_tree, geometry, kernel_rays, quads};
 use antumbra::recipe::Level;
 use antumbra::{Brute, Bvh, Geometry, Isa, Primitives, Ray, Sphere};
 use antumbra_testkit::{Rng, mesh, rays};
@@ -22,7 +22,7 @@ fn check(name: &str, geometries: &[Geometry<'_>], rays: &[Ray]) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: crate::support::cases(4), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(config(4))]
 
     #[test]
     fn every_tree_equals_brute_force(seed: u64) {

@@ -1,7 +1,7 @@
 //! Queries about points: every tree against brute force, and brute force against what is known.
 
 use crate::instances::Scene;
-use crate::support::{TWICE, cases, for_every_tree, geometry};
+use crate::support::{TWICE, config, for_every_tree, geometry};
 use crate::transforms::{Transform, rotation, transform};
 use antumbra::recipe::Builder;
 use antumbra::{
@@ -99,7 +99,7 @@ fn check(bvh: &Bvh, brute: &Brute, points: &[[f32; 3]], rng: &mut Rng, place: &s
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(4), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(config(4))]
 
     /// Triangles and spheres in the world and in instances of any transform.
     #[test]
@@ -116,7 +116,7 @@ proptest! {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(40), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(config(40))]
 
     /// Worlds are trees like others.
     #[test]

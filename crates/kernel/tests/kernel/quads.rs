@@ -7,7 +7,7 @@ use antumbra::{
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 
-use crate::support::{bits, cases, for_every_tree, kernel_rays};
+use crate::support::{bits, config, for_every_tree, kernel_rays};
 use crate::transforms::transform;
 
 /// Quads of any shape and the triangles that they are, two for each.
@@ -53,7 +53,7 @@ fn on_quad(hit: Hit) -> Hit {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(4), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(config(4))]
 
     /// In the world and in instances, by every query.
     #[test]

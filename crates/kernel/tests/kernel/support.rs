@@ -12,12 +12,24 @@ use antumbra::{
     Aabb, Brute, Build, Bvh, Error, Geometry, Hit, Isa, Primitives, Ray, Recipe, UserGeometry,
     UserHit, Width,
 };
+use antumbra_testkit::sample::{self, pairs, triples};
 use antumbra_testkit::{Mesh, Rng, TestRay};
+use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 
 /// Number of random cases of a property: `ANTUMBRA_CASES`, or else `few`.
 pub fn cases(few: u32) -> u32 {
     let told = std::env::var("ANTUMBRA_CASES").ok();
     told.map_or(few, |text| text.parse().expect("a number of cases"))
+}
+
+/// Settings of a property: `cases` of `few` cases, which are those of every run of the same sources.
+pub fn config(few: u32) -> ProptestConfig {
+    ProptestConfig {
+        cases: cases(few),
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(sample::seed()),
+        ..Default::default()
+    }
 }
 
 /// The mesh as kernel geometry.
@@ -172,105 +184,84 @@ pub fn orders() -> Vec<Order> {
     Order::ALL.into_iter().chain([BY_RAY]).collect()
 }
 
-/// The default builder with every collapse, and every other builder with one collapse after the other: the two know
-/// nothing of each other.
-pub fn builders_and_collapses() -> impl Iterator<Item = (Builder, Collapse)> {
-    let collapses = Collapse::ALL.map(|collapse| (Builder::default(), collapse));
-    let turns = Collapse::ALL.into_iter().cycle();
-    collapses.into_iter().chain(other_builders().zip(turns))
+/// Every width at every level.
+pub fn ways() -> Vec<(Width, Isa)> {
+    let at_levels = |width| Isa::available().map(move |isa| (width, isa));
+    Width::ALL.into_iter().flat_map(at_levels).collect()
 }
 
-/// The default builder with every width, and every other builder with one width after the other.
-pub fn builders_and_widths() -> impl Iterator<Item = (Builder, Width)> {
-    let widths = Width::ALL.map(|width| (Builder::default(), width));
-    let turns = Width::ALL.into_iter().cycle();
-    widths.into_iter().chain(other_builders().zip(turns))
+/// Every collapse, which sorts the children of nodes or does not.
+pub fn collapses() -> Vec<(Collapse, bool)> {
+    let sorts = |collapse| [(collapse, false), (collapse, true)];
+    Collapse::ALL.into_iter().flat_map(sorts).collect()
 }
 
-fn other_builders() -> impl Iterator<Item = Builder> {
-    let is_other = |builder: &Builder| *builder != Builder::default();
-    BUILDERS.into_iter().filter(is_other)
-}
-
-/// A tree of every preset and width, and of every builder, width and order, traced at each level in turn. What learns
-/// learns from `rays`. Orders and builders know nothing of each other, so only the first builder has every order with
-/// every width; the others have one order after the other.
+/// Trees of every preset, builder, order, width and level, a sample of their combinations. What learns learns from `rays`.
 pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnMut(&Bvh, &str)) {
-    let mut check_levels = |mut bvh: Bvh, tree: &str| {
-        for isa in Isa::available() {
-            bvh.set_isa(isa);
-            check(&bvh, &format!("{tree} {}", isa.level()));
-        }
-    };
+    let first = rays.first().map_or(0.0, |ray| ray.org[0]);
+    let salt = u64::from(first.to_bits()) << 32 ^ primitives.len() as u64;
     // An interpreter takes its time.
-    let few = cfg!(miri);
-    for preset in Preset::ALL.into_iter().take(if few { 1 } else { 9 }) {
-        for width in Width::ALL {
-            let bvh = Bvh::learn(primitives, rays, &preset.recipe().width(width)).expect("a tree");
-            check_levels(bvh, &format!("preset {preset} x{width}"));
-        }
+    let most = if cfg!(miri) { 3 } else { usize::MAX };
+    let mut check_at = |mut bvh: Bvh, isa: Isa, tree: &str| {
+        bvh.set_isa(isa);
+        check(&bvh, &format!("{tree} {}", isa.level()));
+    };
+    for (preset, (width, isa)) in pairs(salt, &Preset::ALL, &ways()).into_iter().take(most) {
+        let bvh = Bvh::learn(primitives, rays, &preset.recipe().width(width)).expect("a tree");
+        check_at(bvh, isa, &format!("preset {preset} x{width}"));
     }
-    let orders = orders();
-    let mut turns = orders.iter().copied().cycle();
-    for builder in BUILDERS.into_iter().take(if few { 1 } else { 99 }) {
+    let trees = triples(salt, &BUILDERS, &orders(), &ways());
+    for (builder, order, (width, isa)) in trees.into_iter().take(most) {
         let recipe = Recipe::default()
             .builder(builder)
             .collapse(Collapse::Area)
+            .width(width)
             .seed(7);
-        let stage = Build::new(primitives)
-            .recipe(&recipe)
-            .stage()
-            .expect("a tree");
-        for width in Width::ALL {
-            let recipe = recipe.width(width);
-            let built = stage.collapse(&[], &recipe, &()).expect("nobody stops it");
-            let orders = match builder {
-                Builder::BinnedSah if !few => orders.clone(),
-                _ => turns.by_ref().take(1).collect(),
-            };
-            for order in orders {
-                let mut bvh = built.clone();
-                bvh.relearn(rays, &recipe.order(order));
-                check_levels(bvh, &format!("{builder} x{width} {order}"));
-            }
-        }
+        let stage = Build::new(primitives).recipe(&recipe).stage();
+        let built = stage.expect("a tree").collapse(&[], &recipe, &());
+        let mut bvh = built.expect("nobody stops it");
+        bvh.relearn(rays, &recipe.order(order));
+        check_at(bvh, isa, &format!("{builder} x{width} {order}"));
     }
 }
 
-/// Asserts that the trees of every builder, driven by `rays` if that is what drives it, answer every ray as brute force
-/// does, in every collapse.
+/// Asserts that trees of every builder, collapse, width and level answer every ray as brute force does.
 pub fn equals_brute_by_builders(name: &str, primitives: &Primitives, rays: &[Ray]) {
+    let trees = triples(0, &BUILDERS, &Collapse::ALL, &ways());
+    for (builder, collapse, way) in trees {
+        equals_brute_by(builder, collapse, way, name, primitives, rays);
+    }
+}
+
+/// Asserts that one tree, driven by `rays` if that is what drives its builder, answers every ray as brute force does.
+pub fn equals_brute_by(
+    builder: Builder,
+    collapse: Collapse,
+    (width, isa): (Width, Isa),
+    name: &str,
+    primitives: &Primitives,
+    rays: &[Ray],
+) {
     let brute = Brute::new(primitives);
-    for builder in BUILDERS {
-        let tree = BinaryTree::build_for(primitives, builder, rays);
-        let mut log = TreeLog::new(&tree);
-        log.add(primitives, &tree, rays, rays.len() as f32);
-        for (collapse, width) in Collapse::ALL
-            .into_iter()
-            .zip(Width::ALL.into_iter().cycle())
-        {
-            let learning = Learning {
-                collapse,
-                ..Default::default()
-            };
-            let bvh = Bvh::collapse_logged(primitives, &tree, &log, &learning, width, Isa::best());
-            let place = |index: usize| format!("{name}, {builder} {collapse}: {:?}", rays[index]);
-            bvh.validate()
-                .unwrap_or_else(|broken| panic!("{name}, {builder} {collapse}: {broken}"));
-            let mut occluded = vec![false; rays.len()];
-            let mut hits = vec![None; rays.len()];
-            bvh.occluded_batch(rays, &mut occluded);
-            bvh.intersect_batch(rays, &mut hits);
-            for (index, ray) in rays.iter().enumerate() {
-                assert_eq!(occluded[index], brute.occluded(ray), "{}", place(index));
-                assert_eq!(
-                    bits(hits[index]),
-                    bits(brute.intersect(ray)),
-                    "{}",
-                    place(index)
-                );
-            }
-        }
+    let tree = BinaryTree::build_for(primitives, builder, rays);
+    let mut log = TreeLog::new(&tree);
+    log.add(primitives, &tree, rays, rays.len() as f32);
+    let learning = Learning {
+        collapse,
+        ..Default::default()
+    };
+    let bvh = Bvh::collapse_logged(primitives, &tree, &log, &learning, width, isa);
+    let name = format!("{name}, {builder} {collapse} x{width} {}", isa.level());
+    bvh.validate()
+        .unwrap_or_else(|broken| panic!("{name}: {broken}"));
+    let mut occluded = vec![false; rays.len()];
+    let mut hits = vec![None; rays.len()];
+    bvh.occluded_batch(rays, &mut occluded);
+    bvh.intersect_batch(rays, &mut hits);
+    for (index, ray) in rays.iter().enumerate() {
+        let place = || format!("{name}: {ray:?}");
+        assert_eq!(occluded[index], brute.occluded(ray), "{}", place());
+        assert_eq!(bits(hits[index]), bits(brute.intersect(ray)), "{}", place());
     }
 }
 

@@ -12,7 +12,7 @@ use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 
 use crate::support::{
-    BUILDERS, Odd, bits, cases, cutouts, for_every_tree, geometry, kernel_rays, quads, square,
+    BUILDERS, Odd, bits, config, cutouts, for_every_tree, geometry, kernel_rays, quads, square,
 };
 use crate::transforms::transform;
 
@@ -93,7 +93,7 @@ fn excluded(rng: &mut Rng, hits: &[Hit]) -> PrimId {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(2), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(config(2))]
 
     #[test]
     fn every_tree_tells_of_the_hits_of_brute_force(seed: u64) {

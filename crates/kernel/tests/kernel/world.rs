@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::instances::{Expected, Scene};
-use crate::support::{BUILDERS, Stripes, bits, cases, cutouts, geometry, orders, square};
+use crate::support::{BUILDERS, Stripes, bits, config, cutouts, geometry, orders, square};
 use crate::transforms::{IDENTITY, transform, translation};
 use antumbra::parts::{Cost, Steps};
 use antumbra::recipe::Preset;
@@ -106,7 +106,7 @@ fn geometries(scene: &Scene, object: u32) -> Vec<Geometry<'_>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: cases(60), failure_persistence: None, ..Default::default() })]
+    #![proptest_config(config(60))]
 
     /// Instances that move, come and go, with and without a ground.
     #[test]
