@@ -5,6 +5,7 @@ use antumbra::recipe::{Builder, Collapse, Order};
 use antumbra::{Ray, Recipe, Width};
 use antumbra_lab::{Lot, RaysFrom, SampledRays, TrainedTree};
 use antumbra_render::{Options, render};
+use antumbra_testkit::sample::{pairs, triples};
 use glam::Vec3;
 
 const SPP: u32 = 3;
@@ -126,26 +127,21 @@ fn every_combination_answers_alike_and_predicts_a_cost() {
     let mut expected = vec![false; test.len()];
     bvh.occluded_batch(&test, &mut expected);
     let recipe = Recipe::default().seed(5);
-    for builder in Builder::ALL {
-        for from in RaysFrom::ALL {
-            let trained = TrainedTree::new(&world, &recipe.builder(builder), &log.shadow, from);
-            assert_eq!(trained.builder(), builder);
-            for collapse in Collapse::ALL {
-                let mut collapsed = trained.collapse(&recipe.collapse(collapse).width(Width::W8));
-                assert!(collapsed.learned_from() > 0);
-                for order in Order::ALL {
-                    let ordered = collapsed.order(order).expect("an order");
-                    ordered.bvh.validate().expect("a sound tree");
-                    let mut answers = vec![false; test.len()];
-                    ordered.bvh.occluded_batch(&test, &mut answers);
-                    assert!(answers == expected, "{builder} {collapse} {order}");
-                    if let Some([before, after]) = ordered.predicted {
-                        assert!(before >= 1.0 && after >= 1.0 && after.is_finite());
-                        // The paper's order is the best one for the log that predicts.
-                        assert!(order != Order::SortPlus || after <= before + 1e-9);
-                    }
-                }
-            }
+    let kinds = pairs(0, &Builder::ALL, &RaysFrom::ALL);
+    for ((builder, from), collapse, order) in triples(0, &kinds, &Collapse::ALL, &Order::ALL) {
+        let trained = TrainedTree::new(&world, &recipe.builder(builder), &log.shadow, from);
+        assert_eq!(trained.builder(), builder);
+        let mut collapsed = trained.collapse(&recipe.collapse(collapse).width(Width::W8));
+        assert!(collapsed.learned_from() > 0);
+        let ordered = collapsed.order(order).expect("an order");
+        ordered.bvh.validate().expect("a sound tree");
+        let mut answers = vec![false; test.len()];
+        ordered.bvh.occluded_batch(&test, &mut answers);
+        assert!(answers == expected, "{builder} {collapse} {order}");
+        if let Some([before, after]) = ordered.predicted {
+            assert!(before >= 1.0 && after >= 1.0 && after.is_finite());
+            // The paper's order is the best one for the log that predicts.
+            assert!(order != Order::SortPlus || after <= before + 1e-9);
         }
     }
     // Without rays nothing is learned, and nothing fails.

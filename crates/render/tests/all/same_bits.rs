@@ -17,6 +17,7 @@ use antumbra_scene::{
     DirectStrategy, Filter, Geometry, Instance, Integrator, LightStrategy, Object, SamplerKind,
     Shape, TriangleMesh,
 };
+use antumbra_testkit::sample::{pairs, triples};
 use glam::{Affine3, Vec3};
 
 fn integrators() -> Vec<Integrator> {
@@ -102,58 +103,47 @@ fn nothing_but_scene_samples_and_seed_changes_a_picture() {
             assert_eq!(run(options.clone()).stats.prefetch, prefetch);
             same("prefetching or not", options);
         }
-        for collapse in Collapse::ALL {
-            for order in Order::ALL {
-                same(
-                    &format!("{collapse} {order}"),
-                    Options {
-                        recipe: options().recipe.order(order).collapse(collapse),
-                        ..options()
-                    },
-                );
-            }
-            for width in Width::ALL {
-                for isa in Isa::available() {
-                    same(
-                        &format!("{collapse} {width:?} {isa:?}"),
-                        Options {
-                            recipe: options().recipe.isa(isa).collapse(collapse).width(width),
-                            ..options()
-                        },
-                    );
-                }
-            }
-            for log_share in [0.0, 0.1, 1.0] {
-                same(
-                    &format!("{collapse}, log share {log_share}"),
-                    Options {
-                        log_share,
-                        recipe: options().recipe.collapse(collapse),
-                        ..options()
-                    },
-                );
-            }
+        let salt = number as u64;
+        for (collapse, order) in pairs(salt, &Collapse::ALL, &Order::ALL) {
+            let recipe = options().recipe.order(order).collapse(collapse);
+            let options = Options {
+                recipe,
+                ..options()
+            };
+            same(&format!("{collapse} {order}"), options);
         }
-        for (turn, builder) in Builder::ALL.into_iter().enumerate() {
-            for (order, log_share) in [
-                (Order::Simple, 0.1),
-                (Order::SortPlus, 0.0),
-                (Order::SortPlus, 0.2),
-            ] {
-                let collapse = Collapse::ALL[(number + turn) % Collapse::ALL.len()];
-                same(
-                    &format!("{builder} {collapse} {order} {log_share}"),
-                    Options {
-                        log_share,
-                        recipe: options()
-                            .recipe
-                            .order(order)
-                            .builder(builder)
-                            .collapse(collapse),
-                        ..options()
-                    },
-                );
-            }
+        let levels: Vec<_> = Isa::available().collect();
+        for (collapse, width, isa) in triples(salt, &Collapse::ALL, &Width::ALL, &levels) {
+            let recipe = options().recipe.isa(isa).collapse(collapse).width(width);
+            let options = Options {
+                recipe,
+                ..options()
+            };
+            same(&format!("{collapse} {width:?} {isa:?}"), options);
+        }
+        for (collapse, log_share) in pairs(salt, &Collapse::ALL, &[0.0, 0.1, 1.0]) {
+            let options = Options {
+                log_share,
+                recipe: options().recipe.collapse(collapse),
+                ..options()
+            };
+            same(&format!("{collapse}, log share {log_share}"), options);
+        }
+        let logs = [
+            (Order::Simple, 0.1),
+            (Order::SortPlus, 0.0),
+            (Order::SortPlus, 0.2),
+        ];
+        let trees = triples(salt, &Builder::ALL, &Collapse::ALL, &logs);
+        for (builder, collapse, (order, log_share)) in trees {
+            let recipe = options().recipe.order(order).builder(builder);
+            let options = Options {
+                log_share,
+                recipe: recipe.collapse(collapse),
+                ..options()
+            };
+            let what = format!("{builder} {collapse} {order} {log_share}");
+            same(&what, options);
         }
         let measured = Options {
             count: true,
