@@ -2,9 +2,7 @@
 
 use std::cell::RefCell;
 
-use antumbra::{
-    Bvh, Error, Geometry, MovingBvh, MovingInstance, MovingMesh, MovingScene, Ray, Recipe,
-};
+use antumbra::{Bvh, Error, Geometry, Instance, Primitives, Ray, Recipe};
 use antumbra_testkit::{Rng, mesh};
 
 use crate::embree::{Embree, Key};
@@ -20,9 +18,8 @@ pub fn run(embree: &mut Embree, rounds: usize) -> Result<(), Box<dyn std::error:
     for share in [0.001, 0.01, 0.1] {
         let end = bent(&city.positions, share);
         embree.build_moving(&[&city.positions, &end], &city.indices);
-        let keys = vec![city.positions.clone().into(), end.into()];
-        let mesh = MovingMesh::new(keys, city.indices.clone());
-        let scene = MovingScene::new(vec![mesh.into()], vec![], vec![])?;
+        let mesh = Geometry::moving([city.positions.clone(), end], &city.indices[..]);
+        let scene = Primitives::new(&[mesh])?;
         let name = format!("city, moved by {share} of its size");
         compare(&name, &scene, embree, rounds)?;
     }
@@ -32,8 +29,9 @@ pub fn run(embree: &mut Embree, rounds: usize) -> Result<(), Box<dyn std::error:
         let object = vec![Geometry::triangles(ball.positions, ball.indices)];
         let instances = keys
             .iter()
-            .map(|keys| MovingInstance::new(0, keys.map(|key| key.rows()).to_vec()));
-        let scene = MovingScene::new(vec![], vec![object], instances.collect())?;
+            .map(|keys| Instance::moving(0, keys.map(|key| key.rows())));
+        let instances: Vec<_> = instances.collect();
+        let scene = Primitives::with_instances(&[], &[object], &instances)?;
         compare(&format!("{count} instances"), &scene, embree, rounds)?;
     }
     Ok(())
@@ -54,13 +52,13 @@ fn shadows<'a>(ask: impl Fn(&mut [bool]) + 'a) -> Ask<'a> {
 
 fn compare(
     name: &str,
-    scene: &MovingScene<'_>,
+    scene: &Primitives,
     embree: &Embree,
     rounds: usize,
 ) -> Result<(), Error> {
-    let bvh = MovingBvh::build(scene, &Recipe::default())?;
+    let bvh = Bvh::build(scene, &Recipe::default())?;
     // The same rays among what does not move, to see what motion costs.
-    let still = Bvh::build(&scene.middle(0)?, &Recipe::default())?;
+    let still = Bvh::build(&scene.middle(0), &Recipe::default())?;
     let (rays, times) = rays(&bvh);
     let (rays, times, bvh, still) = (&rays[..], &times[..], &bvh, &still);
     let time = |index: usize| times[index];
@@ -77,13 +75,16 @@ fn compare(
             "occluded",
             shadows(|occluded| {
                 for ((ray, time), occluded) in rays.iter().zip(times).zip(occluded) {
-                    *occluded = bvh.occluded(ray, *time);
+                    *occluded = bvh.query(ray).at(*time).occluded();
                 }
             }),
         ),
         (
             "occluded_batch",
-            shadows(|occluded| bvh.occluded_batch(rays, times, occluded)),
+            shadows(|occluded| {
+                let batch = bvh.batch(rays).at(times);
+                batch.on_this_thread().occluded_into(occluded);
+            }),
         ),
         (
             "occluded_batch, nothing moves",
@@ -97,7 +98,8 @@ fn compare(
             "intersect",
             Box::new(|found| {
                 for ((ray, time), found) in rays.iter().zip(times).zip(found) {
-                    *found = bvh.intersect(ray, *time).map_or(f32::INFINITY, |hit| hit.t);
+                    let hit = bvh.query(ray).at(*time).intersect();
+                    *found = hit.map_or(f32::INFINITY, |hit| hit.t);
                 }
             }),
         ),
@@ -105,7 +107,8 @@ fn compare(
             "intersect_batch",
             Box::new(|found| {
                 let mut hits = vec![None; rays.len()];
-                bvh.intersect_batch(rays, times, &mut hits);
+                let batch = bvh.batch(rays).at(times);
+                batch.on_this_thread().intersect_into(&mut hits);
                 for (found, hit) in found.iter_mut().zip(hits) {
                     *found = hit.map_or(f32::INFINITY, |hit| hit.t);
                 }
@@ -194,7 +197,7 @@ fn balls(count: usize) -> (Mesh, Vec<[Key; 2]>) {
 }
 
 /// Rays without end from what the first rays through the scene hit, in random directions away from there, each at a time of its own.
-fn rays(bvh: &MovingBvh) -> (Vec<Ray>, Vec<f32>) {
+fn rays(bvh: &Bvh) -> (Vec<Ray>, Vec<f32>) {
     let mut rng = Rng::new(11);
     let bounds = bvh.bounds();
     let offset = bounds.origin_offset();
@@ -205,7 +208,7 @@ fn rays(bvh: &MovingBvh) -> (Vec<Ray>, Vec<f32>) {
     while rays.len() < RAYS {
         let time = rng.unit();
         let first = Ray::new(inside(&mut rng), rng.direction());
-        let Some(hit) = bvh.intersect(&first, time) else {
+        let Some(hit) = bvh.query(&first).at(time).intersect() else {
             continue;
         };
         let at = first.at(hit.t);

@@ -3,8 +3,8 @@
 //! Names of questions are words of the digest, and stay when what they call is renamed.
 
 use antumbra::{
-    Batch, Bvh, ClosestPoint, Column, Directions, Hit, MovingBvh, PrimId, Ray, RayColumns,
-    RayOrder, RayQuery, Surface, Visit,
+    Batch, Bvh, ClosestPoint, Column, Directions, Hit, PrimId, Ray, RayColumns, RayOrder, RayQuery,
+    Surface, Visit,
 };
 use xxhash_rust::xxh3::Xxh3Default;
 
@@ -341,7 +341,7 @@ impl<'a> Questions<'a> {
 }
 
 /// Everything about rays at times.
-pub fn at_times(bvh: &MovingBvh, moving: &Moving) -> Vec<Answer> {
+pub fn at_times(bvh: &Bvh, moving: &Moving) -> Vec<Answer> {
     let Moving { rays, times, .. } = moving;
     let (mut found, mut hits) = (vec![false; rays.len()], vec![None; rays.len()]);
     let mut answers = Vec::new();
@@ -354,13 +354,11 @@ pub fn at_times(bvh: &MovingBvh, moving: &Moving) -> Vec<Answer> {
                 &mut hits[range],
             );
             if way == "single" {
-                (found[0], hits[0]) = (
-                    bvh.occluded(&rays[0], times[0]),
-                    bvh.intersect(&rays[0], times[0]),
-                );
+                let query = bvh.query(&rays[0]).at(times[0]);
+                (found[0], hits[0]) = (query.occluded(), query.intersect());
             } else {
-                bvh.occluded_batch(rays, times, found);
-                bvh.intersect_batch(rays, times, hits);
+                bvh.batch(rays).at(times).occluded_into(found);
+                bvh.batch(rays).at(times).intersect_into(hits);
             }
         }
         answers.push(Sums::flags(&found).answer("occluded", ("none", way)));

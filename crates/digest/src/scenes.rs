@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity, Pattern};
 use antumbra::{
-    Aabb, CurveBasis, Curves, Disk, Geometry, Instance, LocalOrigin, MovingGeometry,
-    MovingInstance, MovingMesh, MovingScene, NestedInstances, Ray, Sphere, UserGeometry, UserHit,
+    Aabb, CurveBasis, Curves, Disk, Geometry, Instance, LocalOrigin, NestedInstances, Ray, Sphere,
+    UserGeometry, UserHit,
 };
 use antumbra_scene::builtin;
 use antumbra_testkit::{Mesh, Rng, TestRay, mesh, rays};
@@ -25,7 +25,9 @@ pub struct Scene {
 
 /// What moves while rays are traced, each ray at its own time.
 pub struct Moving {
-    pub scene: MovingScene<'static>,
+    pub world: Vec<Geometry<'static>>,
+    pub objects: Vec<Vec<Geometry<'static>>>,
+    pub instances: Vec<Instance>,
     pub rays: Vec<Ray>,
     pub times: Vec<f32>,
 }
@@ -388,7 +390,7 @@ fn placed(rng: &mut Rng, scene: Scene, geometries: Vec<Geometry<'static>>) -> Sc
     let count = objects.len() as u32;
     let mut world: Vec<_> = (0..5 * count).map(|i| place(rng, i % count)).collect();
     // In the same place twice: every distance is a tie.
-    world.push(world[0]);
+    world.push(world[0].clone());
     world.extend((0..6).map(|i| place(rng, count + i % 2)));
     let mut inside = vec![Vec::new(); objects.len()];
     inside.push((0..3).map(|i| place(rng, i % count)).collect());
@@ -476,18 +478,16 @@ pub fn moving() -> Moving {
         let moved = moved.collect();
         keys.push(moved);
     }
-    let keys = keys.into_iter().map(Into::into).collect();
-    let mut world: Vec<MovingGeometry<'static>> =
-        vec![MovingMesh::new(keys, shape.indices.clone()).into()];
-    world.extend([triangles(&still), cut(&veil, 1), pairs(&veil)].map(Into::into));
-    world.push(spheres(rng, &still.positions[..60], 0.1).into());
+    let mut world = vec![Geometry::moving(keys, shape.indices.clone())];
+    world.extend([triangles(&still), cut(&veil, 1), pairs(&veil)]);
+    world.push(spheres(rng, &still.positions[..60], 0.1));
     let objects = vec![
         vec![triangles(&veil)],
         vec![spheres(rng, &veil.positions, 0.2)],
     ];
     let path = |number: u32| {
         let keys = if number.is_multiple_of(4) { 1 } else { 3 };
-        MovingInstance::new(number % 2, (0..keys).map(|_| transform(rng, 1.0)).collect())
+        Instance::moving(number % 2, (0..keys).map(|_| transform(rng, 1.0)))
     };
     let instances = (0..16).map(path).collect();
     let mut rays = rays_for(rng, &together(&[&shape, &still]));
@@ -499,7 +499,9 @@ pub fn moving() -> Moving {
     };
     let times = rays.iter().map(time).collect();
     Moving {
-        scene: MovingScene::new(world, objects, instances).expect("as many keys"),
+        world,
+        objects,
+        instances,
         rays,
         times,
     }

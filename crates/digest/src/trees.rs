@@ -1,10 +1,9 @@
 //! All trees of a scene: how they are made, what they count, and the bytes that are saved. All calls of builds are here.
 
-use antumbra::lab::{Cost, Laboratory};
-use antumbra::recipe::{Builder, Collapse, Level, Order, Preset};
-use antumbra::{
-    Build, Bvh, Instance, Isa, Masks, MovingBvh, Object, Primitives, Ray, Recipe, Width, World,
-};
+use antumbra::parts::{Cost, Steps};
+use antumbra::recipe::{Builder, Level, Preset};
+use antumbra::{Build, Bvh, Instance, Isa, Masks, Object, Primitives, Ray, Recipe, Width, World};
+use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::scenes::{Moving, Scene};
@@ -45,7 +44,7 @@ pub fn by_presets(primitives: &Primitives, rays: &[Ray]) -> Vec<(&'static str, W
 pub fn by_choices(primitives: &Primitives, rays: &[Ray]) -> Vec<(&'static str, String, Bvh)> {
     let mut trees = Vec::new();
     let fast = Recipe::fast().seed(7);
-    for builder in Builder::ALL {
+    for builder in BUILDERS {
         let recipe = fast.builder(builder);
         let stage = Build::new(primitives)
             .recipe(&recipe)
@@ -61,10 +60,10 @@ pub fn by_choices(primitives: &Primitives, rays: &[Ray]) -> Vec<(&'static str, S
             if builder != Builder::BinnedSah {
                 continue;
             }
-            for order in Order::ALL {
+            for order in ORDERS {
                 add("order", order.name(), &recipe.order(order));
             }
-            for collapse in Collapse::ALL {
+            for collapse in COLLAPSES {
                 add("collapse", collapse.name(), &recipe.collapse(collapse));
             }
         }
@@ -132,18 +131,21 @@ pub fn changed(scene: &Scene, width: Width, mut bvh: Bvh) -> Vec<(&'static str, 
 }
 
 /// Trees of a moving scene: wholes, and one for each span of time.
-pub fn moving(moving: &Moving, width: Width) -> ([(&'static str, MovingBvh); 2], Vec<Bvh>) {
-    let Moving { scene, rays, times } = moving;
+pub fn moving(moving: &Moving, width: Width) -> ([(&'static str, Bvh); 2], Vec<Bvh>) {
+    let primitives =
+        Primitives::with_instances(&moving.world, &moving.objects, &moving.instances).expect(SOUND);
     let recipe = Recipe::default().width(width);
-    let plain = MovingBvh::build(scene, &recipe).expect(SOUND);
-    let learned = MovingBvh::learn(scene, rays, times, &recipe).expect(SOUND);
+    let build = Build::new(&primitives).recipe(&recipe);
+    let plain = build.bvh().expect(SOUND);
+    let learned = build.rays(&moving.rays).times(&moving.times);
+    let learned = learned.bvh().expect(SOUND);
     let span = |span| {
-        let primitives = scene.middle(span).expect(SOUND);
-        Bvh::learn(&primitives, &training(rays), &recipe).expect(SOUND)
+        let primitives = primitives.middle(span);
+        Bvh::learn(&primitives, &training(&moving.rays), &recipe).expect(SOUND)
     };
     (
         [("plain", plain), ("learned", learned)],
-        (0..scene.spans()).map(span).collect(),
+        (0..primitives.spans()).map(span).collect(),
     )
 }
 

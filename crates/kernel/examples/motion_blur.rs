@@ -4,7 +4,7 @@
 //!
 //! Prints how much of each place the things cover while the shutter is open.
 
-use antumbra::{Geometry, MovingBvh, MovingInstance, MovingMesh, MovingScene, Ray, Recipe, Sphere};
+use antumbra::{Geometry, Instance, Ray, Recipe, Sphere, World};
 
 fn main() -> Result<(), antumbra::Error> {
     let door = |angle: f32| -> Vec<[f32; 3]> {
@@ -37,13 +37,11 @@ fn main() -> Result<(), antumbra::Error> {
         .collect();
 
     // ANCHOR: book
-    let mesh = MovingMesh::new(vec![closed.into(), open.into()], door_indices);
-    let rolling = MovingInstance::new(0, vec![at_start, at_end]);
-    let scene = MovingScene::new(vec![mesh.into()], vec![vec![ball]], vec![rolling])?;
-    let bvh = MovingBvh::build(&scene, &Recipe::default())?;
+    let mesh = Geometry::moving([closed, open], door_indices);
+    let rolling = Instance::moving(0, [at_start, at_end]);
+    let bvh = World::fixed(&[mesh], &[[ball]], &[rolling], &[], &Recipe::default())?;
 
-    let mut hits = vec![None; rays.len()];
-    bvh.intersect_batch(&rays, &times, &mut hits);
+    let hits = bvh.batch(&rays).at(&times).intersect();
     // ANCHOR_END: book
     let picture = hits.chunks(TIMES).map(|hits| {
         let covered = hits.iter().flatten().count();

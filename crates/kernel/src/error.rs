@@ -149,6 +149,8 @@ pub enum Error {
         /// Index of the instance.
         inst_id: u32,
     },
+    /// Something moves that cannot, in words.
+    Moves(&'static str),
     /// A scene that moves got another number of trees than it has spans between two keys.
     OtherTrees {
         /// Spans of the scene.
@@ -299,6 +301,7 @@ impl fmt::Display for Error {
                 f,
                 "the path of instance {inst_id} leaves the range of single precision"
             ),
+            Self::Moves(why) => write!(f, "{why}"),
             Self::OtherTrees { expected, found } => write!(
                 f,
                 "a scene that moves needs one tree per span between two keys, {expected} in all, but got {found}"

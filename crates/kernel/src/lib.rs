@@ -64,7 +64,8 @@
 //! An [`Object`] is built once. When instances of a [`World`] move, only the nodes above the objects are built again.
 //! [`Bvh::refit`] moves vertices and keeps the nodes. [`Bvh::relearn`] learns the child order again for the rays of today.
 //!
-//! A [`MovingBvh`] has motion blur: meshes and instances that move while rays are traced, each ray at a time of its own.
+//! For motion blur, [`Geometry::moving`] and [`Instance::moving`] move while rays are traced, and each ray looks at a time of
+//! its own: [`Batch::at`].
 //!
 //! # Where things are
 //! [`Geometry`] and [`Primitives`] go in, a [`Recipe`] says how, [`Bvh`] answers. [`Bvh::batch`] takes many rays, also
@@ -124,7 +125,6 @@ pub use api::bvh::Bvh;
 pub use api::child_order::ChildOrder;
 pub use api::group::{Directions, Group};
 pub use api::hit_lists::HitLists;
-pub use api::moving::{Motion, MovingBvh};
 pub use api::object::Object;
 pub use api::points::ClosestPoint;
 pub use api::ray_memory::RayMemory;
@@ -141,8 +141,7 @@ pub use geometry::primitives::Primitives;
 pub use geometry::primitives::dropped::{DropReason, Dropped};
 pub use geometry::{
     CubicSegments, CurveBasis, Curves, Disk, Functions, Geometry, GeometryId, Instance,
-    LocalOrigin, MovingGeometry, MovingInstance, MovingMesh, MovingScene, NestedInstances,
-    QuadMesh, Sphere, TriangleMesh, UserGeometry, UserHit,
+    LocalOrigin, NestedInstances, QuadMesh, Sphere, TriangleMesh, UserGeometry, UserHit,
 };
 pub use monitor::BuildMonitor;
 pub use prim_id::PrimId;

@@ -1,5 +1,6 @@
 //! Batches: many rays at once, among threads or on one, in the order given or in one that is faster.
 
+use alloc::borrow::Cow;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::cell::Cell;
@@ -7,9 +8,11 @@ use core::fmt;
 use core::ops::Range;
 
 use super::bvh::Bvh;
+use super::moving::Moment;
 use super::query::FEW;
 use super::ray_order::{RayOrder, piece_len};
 use crate::geometry::QueryKind;
+use crate::geometry::motion::locate;
 use crate::parallel::{for_each, threads};
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
@@ -17,7 +20,7 @@ use crate::ray_columns::Rays;
 use crate::trace::condition::{Condition, Conditions, RayMasks};
 use crate::trace::memory::Memory;
 use crate::trace::ray_batch::{RayBatch, Report};
-use crate::trace::ray_sort::Grid;
+use crate::trace::ray_sort::{Grid, Key};
 use crate::trace::surface::Surface;
 
 /// Rays that one thread takes at a time.
@@ -50,6 +53,8 @@ pub struct Batch<'a> {
     pub(super) rays: Rays<'a>,
     pub(super) among_threads: bool,
     pub(super) closed: bool,
+    /// A time for each ray, if anything moves.
+    times: Option<&'a [f32]>,
     conditions: Conditions<'a>,
     order: RayOrder,
 }
@@ -62,6 +67,7 @@ impl Bvh {
             rays: rays.into(),
             among_threads: true,
             closed: false,
+            times: None,
             conditions: Conditions {
                 except: None,
                 mask: None,
@@ -176,6 +182,30 @@ impl<'a> Batch<'a> {
         Self { conditions, ..self }
     }
 
+    /// Looks at the scene at a time from 0 to 1 for each ray: see [`Bvh::moving`]. Times outside are clamped, and NaN counts as
+    /// 0. Changes nothing where nothing moves.
+    ///
+    /// ```
+    /// use antumbra::{Bvh, Geometry, Ray, Recipe};
+    ///
+    /// let at = |x: f32| vec![[x, 0.0, 1.0], [x + 1.0, 0.0, 1.0], [x, 1.0, 1.0]];
+    /// let mesh = Geometry::moving([at(0.0), at(4.0)], vec![[0, 1, 2]]);
+    /// let bvh = Bvh::build(&[mesh], &Recipe::default())?;
+    /// let rays = [Ray::new([2.2, 0.2, 0.0], [0.0, 0.0, 1.0]); 2];
+    /// assert_eq!(bvh.batch(&rays).at(&[0.0, 0.5]).occluded(), [false, true]);
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
+    ///
+    /// # Panics
+    /// If there are not as many times as rays.
+    pub fn at(self, times: &'a [f32]) -> Self {
+        assert_eq!(self.rays.len(), times.len(), "one time per ray");
+        Self {
+            times: self.bvh.moves().then_some(times),
+            ..self
+        }
+    }
+
     /// Order in which the rays are traced. Default: [`RayOrder::AsGiven`].
     pub fn order(self, order: RayOrder) -> Self {
         Self { order, ..self }
@@ -220,9 +250,9 @@ impl<'a> Batch<'a> {
     pub fn occluded_into(self, occluded: &mut [bool]) {
         assert_eq!(self.rays.len(), occluded.len(), "one answer per ray");
         if occluded.len() < FEW {
-            return self.each(occluded, |ray, condition| match condition {
-                None => self.bvh.occluded(ray),
-                Some(condition) => self.bvh.occluded_when(ray, condition),
+            return self.each(occluded, |moment, ray, condition| match condition {
+                None => moment.occluded(ray),
+                Some(condition) => moment.occluded_when(ray, condition),
             });
         }
         self.occluded_range(0..occluded.len(), occluded);
@@ -269,11 +299,11 @@ impl<'a> Batch<'a> {
     pub fn intersect_into(self, hits: &mut [Option<Hit>]) {
         assert_eq!(self.rays.len(), hits.len(), "one answer per ray");
         if hits.len() < FEW {
-            return self.each(hits, |ray, condition| {
-                let closest = self.bvh.intersect(ray);
+            return self.each(hits, |moment, ray, condition| {
+                let closest = moment.intersect(ray);
                 match condition {
                     None => closest,
-                    Some(condition) => self.bvh.closest_when(ray, condition, closest),
+                    Some(condition) => moment.closest_when(ray, condition, closest),
                 }
             });
         }
@@ -283,8 +313,8 @@ impl<'a> Batch<'a> {
             CHUNK,
             range,
             hits,
-            &|memory, batch, hits| {
-                self.bvh.intersect_many(memory, batch, hits);
+            &|bvh, memory, batch, hits| {
+                bvh.intersect_many(memory, batch, hits);
             },
         );
     }
@@ -310,8 +340,8 @@ impl<'a> Batch<'a> {
             CHUNK,
             range,
             surfaces,
-            &|memory, batch, answers| {
-                self.bvh.surfaces(memory, batch, answers);
+            &|bvh, memory, batch, answers| {
+                bvh.surfaces(memory, batch, answers);
             },
         );
     }
@@ -338,7 +368,7 @@ impl<'a> Batch<'a> {
             CHUNK,
             range,
             occluders,
-            &|memory, batch, answers| {
+            &|bvh, memory, batch, answers| {
                 answers.fill(None);
                 let mut occluded = core::mem::take(&mut memory.answers);
                 occluded.clear();
@@ -346,20 +376,26 @@ impl<'a> Batch<'a> {
                 let cells = Cell::from_mut(answers).as_slice_of_cells();
                 let report = |index: usize, occluder| cells[index].set(Some(occluder));
                 let batch = batch.reporting(Report::Occluder(&report));
-                self.bvh.occluded_many(memory, &batch, &mut occluded);
+                bvh.occluded_many(memory, &batch, &mut occluded);
                 memory.answers = occluded;
             },
         );
     }
 
     /// Answers a few rays one by one, with their conditions if there are any.
-    fn each<A>(&self, answers: &mut [A], answer: impl Fn(&Ray, Option<&Condition<'_>>) -> A) {
+    fn each<A>(
+        &self,
+        answers: &mut [A],
+        answer: impl Fn(Moment<'_>, &Ray, Option<&Condition<'_>>) -> A,
+    ) {
         let is_plain = self.conditions.are_none();
         for (place, found) in answers.iter_mut().enumerate() {
-            let ray = self.ray(place);
+            let (moment, ray) = (self.moment(place), self.ray(place));
             *found = match is_plain {
-                true => answer(&ray, None),
-                false => (self.conditions).with(place, |condition| answer(&ray, Some(condition))),
+                true => answer(moment, &ray, None),
+                false => {
+                    (self.conditions).with(place, |condition| answer(moment, &ray, Some(condition)))
+                }
             };
         }
     }
@@ -371,8 +407,8 @@ impl<'a> Batch<'a> {
             CHUNK,
             range,
             occluded,
-            &|memory, batch, occluded| {
-                self.bvh.occluded_many(memory, batch, occluded);
+            &|bvh, memory, batch, occluded| {
+                bvh.occluded_many(memory, batch, occluded);
             },
         );
     }
@@ -385,7 +421,7 @@ impl<'a> Batch<'a> {
         chunk: usize,
         range: Range<usize>,
         answers: &mut [A],
-        query: &(impl Fn(&mut Memory, &RayBatch<'_>, &mut [A]) + Sync),
+        query: &(impl Fn(&Bvh, &mut Memory, &RayBatch<'_>, &mut [A]) + Sync),
     ) {
         let threads = if self.among_threads { threads() } else { 1 };
         let grid = (self.order).grid(&self.rays, self.bvh, kind, threads);
@@ -410,6 +446,28 @@ impl<'a> Batch<'a> {
         (!self.conditions.are_none()).then_some(&self.conditions)
     }
 
+    /// The trees that rays look at, by spans.
+    pub(super) fn trees(&self) -> impl Iterator<Item = (usize, &'a Bvh)> {
+        let spans = self.times.map_or(1, |_| usize::MAX);
+        self.bvh.spans().take(spans).enumerate()
+    }
+
+    /// Whether ray `place` looks at the tree of a span.
+    pub(super) fn is_in(&self, span: usize, place: usize) -> bool {
+        let spans = self.bvh.spans().count();
+        (self.times).is_none_or(|times| locate(times[place], spans).0 == span)
+    }
+
+    /// Tree and moment that ray `place` looks at.
+    pub(super) fn moment(&self, place: usize) -> Moment<'a> {
+        self.bvh.moment(self.times.map(|times| times[place]))
+    }
+
+    /// The share of the span at which ray `place` looks.
+    pub(super) fn share(&self, place: usize) -> Option<f32> {
+        self.moment(place).share
+    }
+
     /// Ray `place` as it is traced.
     pub(super) fn ray(&self, place: usize) -> Ray {
         let ray = self.rays.get(place);
@@ -423,37 +481,53 @@ impl<'a> Batch<'a> {
         range: Range<usize>,
         answers: &mut [A],
         grid: Option<&Grid>,
-        query: &impl Fn(&mut Memory, &RayBatch<'_>, &mut [A]),
+        query: &impl Fn(&Bvh, &mut Memory, &RayBatch<'_>, &mut [A]),
     ) {
         let (first, conditions) = (range.start, self.conditions());
         let is_alike = self.order == RayOrder::Alike;
-        if let (Rays::List(rays), false, None) = (&self.rays, self.closed, grid) {
+        let is_keyed = grid.is_some() || self.times.is_some();
+        if let (Rays::List(rays), false, false) = (&self.rays, self.closed, is_keyed) {
             let batch = RayBatch::new(&rays[range], first).under(conditions);
-            return query(memory, &batch.alike(is_alike), answers);
+            return query(self.bvh, memory, &batch.alike(is_alike), answers);
         }
         let mut rays = core::mem::take(&mut memory.rays);
-        match grid {
-            None => {
+        match is_keyed {
+            false => {
                 for (index, answers) in answers.chunks_mut(GATHER).enumerate() {
                     let first = first + index * GATHER;
                     rays.clear();
                     rays.extend((first..first + answers.len()).map(|place| self.ray(place)));
                     let batch = RayBatch::new(&rays, first).under(conditions);
-                    query(memory, &batch.alike(is_alike), answers);
+                    query(self.bvh, memory, &batch.alike(is_alike), answers);
                 }
             }
-            Some(grid) => {
+            true => {
                 let mut keys = core::mem::take(&mut memory.keys);
-                let sorted = keys.sort(grid, range.map(|place| self.rays.get(place)));
+                let sorted = match grid {
+                    Some(grid) => keys.sort(grid, range.map(|place| self.rays.get(place))),
+                    None => keys.as_given(range.len()),
+                };
                 let mut found = vec![A::default(); GATHER.min(answers.len())];
-                for keys in sorted.chunks(GATHER) {
-                    rays.clear();
-                    rays.extend(keys.iter().map(|key| self.ray(first + key.index())));
-                    let found = &mut found[..keys.len()];
-                    let batch = RayBatch::by_keys(&rays, first, keys).under(conditions);
-                    query(memory, &batch, found);
-                    for (key, answer) in keys.iter().zip(found) {
-                        answers[key.index()] = *answer;
+                for (span, bvh) in self.trees() {
+                    let own = match self.times {
+                        None => Cow::Borrowed(sorted),
+                        Some(_) => {
+                            let own = |key: &&Key| self.is_in(span, first + key.index());
+                            sorted.iter().filter(own).copied().collect()
+                        }
+                    };
+                    for keys in own.chunks(GATHER) {
+                        let places = keys.iter().map(|key| first + key.index());
+                        rays.clear();
+                        rays.extend(places.clone().map(|place| self.ray(place)));
+                        let shares: Option<Vec<f32>> =
+                            places.map(|place| self.share(place)).collect();
+                        let found = &mut found[..keys.len()];
+                        let batch = RayBatch::by_keys(&rays, first, keys).under(conditions);
+                        query(bvh, memory, &batch.at(shares.as_deref()), found);
+                        for (key, answer) in keys.iter().zip(found) {
+                            answers[key.index()] = *answer;
+                        }
                     }
                 }
                 memory.keys = keys;
@@ -469,6 +543,7 @@ impl fmt::Debug for Batch<'_> {
             .field("rays", &self.rays.len())
             .field("among_threads", &self.among_threads)
             .field("closed", &self.closed)
+            .field("has_times", &self.times.is_some())
             .field("has_conditions", &!self.conditions.are_none())
             .field("order", &self.order)
             .finish_non_exhaustive()

@@ -10,6 +10,7 @@ use super::stage::{BinaryStage, Stage, reached};
 use super::times::Stopwatch;
 use crate::error::Error;
 use crate::geometry::Geometry;
+use crate::geometry::motion::locate;
 use crate::geometry::primitives::Primitives;
 use crate::monitor::BuildMonitor;
 use crate::ray::Ray;
@@ -38,6 +39,7 @@ pub struct Build<'a> {
     source: Source<'a>,
     recipe: Recipe,
     rays: &'a [Ray],
+    times: &'a [f32],
     monitor: &'a dyn BuildMonitor,
 }
 
@@ -73,6 +75,7 @@ impl<'a> Build<'a> {
             source: source.into(),
             recipe: Recipe::default(),
             rays: &[],
+            times: &[],
             monitor: &(),
         }
     }
@@ -91,6 +94,15 @@ impl<'a> Build<'a> {
     /// between surfaces, from which every tree learns by default. Answers stay the same.
     pub fn rays(self, rays: &'a [Ray]) -> Self {
         Self { rays, ..self }
+    }
+
+    /// Learns from each ray at a time of its own, where something moves. Without a call all rays are of time 0. A ray is
+    /// followed through the middle of the span that its time is in.
+    ///
+    /// # Panics
+    /// The build, if there are not as many times as rays.
+    pub fn times(self, times: &'a [f32]) -> Self {
+        Self { times, ..self }
     }
 
     /// With a monitor, which receives the progress of the build and may stop it. Sorting primitives into a first tree and
@@ -125,9 +137,14 @@ impl<'a> Build<'a> {
     /// Builds an object, to be placed in [worlds](crate::World). Rays are rays in its own space.
     ///
     /// # Errors
-    /// As [`Build::bvh`]; [`Error::HasInstances`] if the primitives have instances: worlds have one level of them.
+    /// As [`Build::bvh`]; [`Error::HasInstances`] if the primitives have instances: worlds have one level of them;
+    /// [`Error::Moves`] if something moves.
     pub fn object(self) -> Result<Object, Error> {
         let primitives = self.primitives()?;
+        stands_still(
+            &primitives,
+            "an object cannot move inside, but its instances can",
+        )?;
         if !primitives.instances.is_empty() {
             return Err(Error::HasInstances);
         }
@@ -138,9 +155,11 @@ impl<'a> Build<'a> {
     /// builder, training and clock count here.
     ///
     /// # Errors
-    /// As [`Build::bvh`].
+    /// As [`Build::bvh`]; [`Error::Moves`] if something moves: [`Bvh::moving`] takes trees over
+    /// [`Primitives::middle`] of every span.
     pub fn stage(self) -> Result<Stage, Error> {
         let primitives = self.primitives()?;
+        stands_still(&primitives, "a stage makes trees of what stands still")?;
         let binary = BinaryStage::new(&primitives, self.rays, &self.recipe, self.monitor)?;
         Ok(Stage::new(primitives, binary))
     }
@@ -157,11 +176,39 @@ impl<'a> Build<'a> {
         let Self {
             recipe,
             rays,
+            times,
             monitor,
             ..
         } = self;
-        let stage = BinaryStage::new(primitives, rays, recipe, *monitor)?;
-        stage.learn(primitives, rays, recipe, *monitor)
+        let learned = |primitives: &Primitives, rays: &[Ray]| {
+            let stage = BinaryStage::new(primitives, rays, recipe, *monitor)?;
+            stage.learn(primitives, rays, recipe, *monitor)
+        };
+        if !primitives.moves() {
+            return learned(primitives, rays);
+        }
+        assert!(
+            times.is_empty() || times.len() == rays.len(),
+            "one time per ray"
+        );
+        let spans = primitives.spans();
+        let trees = (0..spans).map(|span| {
+            let times = times.iter().copied().chain(core::iter::repeat(0.0));
+            let timed = rays.iter().zip(times);
+            let own = timed.filter(|(_, time)| locate(*time, spans).0 == span);
+            learned(
+                &primitives.middle(span),
+                &own.map(|(ray, _)| *ray).collect::<Vec<_>>(),
+            )
+        });
+        Bvh::moving(primitives, trees.collect::<Result<_, _>>()?)
+    }
+}
+
+fn stands_still(primitives: &Primitives, why: &'static str) -> Result<(), Error> {
+    match primitives.moves() {
+        true => Err(Error::Moves(why)),
+        false => Ok(()),
     }
 }
 

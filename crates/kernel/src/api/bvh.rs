@@ -3,6 +3,7 @@
 use alloc::format;
 use alloc::string::String;
 use alloc::sync::Arc;
+use alloc::vec::Vec;
 use core::fmt;
 
 use antumbra_simd::Isa;
@@ -25,6 +26,7 @@ use crate::tree::width::Width;
 /// | trace many rays | [`Bvh::occluded_batch`], [`Bvh::intersect_batch`], and [`Bvh::batch`] for every choice |
 /// | look around points | [`Bvh::closest`], [`Bvh::within`], [`Bvh::contains`], [`Bvh::signed_distance`], [`Bvh::winding_number`] |
 /// | follow what moves | [`Bvh::refit`], [`Bvh::relearn`], and [`World`](crate::World) for instances |
+/// | motion blur | [`Geometry::moving`](crate::Geometry::moving), [`RayQuery::at`](crate::RayQuery::at), [`Batch::at`](crate::Batch::at) |
 /// | save and load | [`Bvh::write`], [`Bvh::read`], [`Bvh::to_bytes`], [`Bvh::from_bytes`] |
 ///
 /// Every query returns the same bits for every width, order, level and builder. The tree can be shared among
@@ -61,6 +63,8 @@ pub struct Bvh {
     pub(crate) built_sah: Option<f64>,
     /// Masks of geometries and instances, if any were given.
     pub(crate) masks: Option<Arc<SceneMasks>>,
+    /// The trees of later spans of a scene that moves.
+    pub(crate) later: Vec<Bvh>,
 }
 
 impl Bvh {
@@ -81,6 +85,7 @@ impl Bvh {
             times: None,
             built_sah: None,
             masks: None,
+            later: Vec::new(),
         }
     }
 
@@ -104,12 +109,15 @@ impl Bvh {
     /// Runs queries on another instruction set from now on.
     pub fn set_isa(&mut self, isa: Isa) {
         self.isa = isa;
+        self.later.iter_mut().for_each(|bvh| bvh.set_isa(isa));
     }
 
-    /// The smallest box around everything; empty for an empty scene.
+    /// The smallest box around everything; empty for an empty scene. Where something moves, around everything at all times;
+    /// boxes of moving instances are a little larger than needed.
     #[must_use]
     pub fn bounds(&self) -> Aabb {
-        self.tree.bounds
+        let bounds = self.spans().map(|bvh| bvh.tree.bounds);
+        bounds.fold(Aabb::EMPTY, |all, bounds| all.union(&bounds))
     }
 
     /// Checks every promise of the tree that traversal relies on; for tests and bug reports.
@@ -117,6 +125,9 @@ impl Bvh {
     /// # Errors
     /// The first broken promise, in words.
     pub fn validate(&self) -> Result<(), String> {
+        for bvh in self.spans() {
+            bvh.tree.check_motion()?;
+        }
         let found = self.tree.validate()?;
         if found == self.primitives {
             Ok(())

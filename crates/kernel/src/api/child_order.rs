@@ -137,6 +137,8 @@ impl Bvh {
     /// thousand. Rays of the last frames are a good sample, see [`RayMemory`](crate::RayMemory). Without rays an order that
     /// [learns](crate::recipe::Order::learns) changes nothing, and [`Order::Simple`](crate::recipe::Order::Simple) never does.
     ///
+    /// A tree that [moves](Bvh::moves) keeps its order.
+    ///
     /// ```
     /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
     /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
@@ -169,6 +171,9 @@ impl Bvh {
         rays: &[Ray],
         recipe: &Recipe,
     ) -> ChildOrder {
+        if self.moves() {
+            return ChildOrder::default();
+        }
         let log = self
             .learn_order(rays, None, recipe)
             .expect("the log is made here, of this tree and as the order needs it");
@@ -179,7 +184,9 @@ impl Bvh {
 
     /// [`Bvh::adopt`], for an order whose nodes are counted from `first`.
     pub(super) fn adopt_from(&mut self, first: usize, order: &ChildOrder) {
-        order.apply(&mut self.tree, first);
+        if !self.moves() {
+            order.apply(&mut self.tree, first);
+        }
     }
 }
 

@@ -99,7 +99,7 @@ pub struct Group<'a> {
 }
 
 impl Bvh {
-    /// Rays from points in directions, to be traced together. Points are `[n, 3]`; a point that is not finite has no rays.
+    /// Rays from points in directions, to be traced together, at time 0 where something moves. Points are `[n, 3]`; a point that is not finite has no rays.
     pub fn group<'a>(&'a self, points: &'a [[f32; 3]], directions: &'a Directions) -> Group<'a> {
         Group {
             bvh: self,

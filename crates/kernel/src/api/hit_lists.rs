@@ -7,6 +7,7 @@ use core::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
 use super::batch::Batch;
+use super::moving::Moment;
 use crate::geometry::QueryKind;
 use crate::ray::Hit;
 use crate::trace::memory::Memory;
@@ -117,10 +118,15 @@ impl Batch<'_> {
             CHUNK,
             0..places.len(),
             places,
-            &|memory, batch, places: &mut [Place]| {
+            &|bvh, memory, batch, places: &mut [Place]| {
                 let mut hits = Vec::new();
                 for (index, place) in places.iter_mut().enumerate() {
-                    *place = self.hits_of(memory, (batch, index), &mut hits);
+                    *place = hits_of(
+                        bvh.moment_of(batch, index),
+                        memory,
+                        (batch, index),
+                        &mut hits,
+                    );
                 }
                 let mut lists = lists.lock().unwrap_or_else(PoisonError::into_inner);
                 for place in places {
@@ -140,32 +146,10 @@ impl Batch<'_> {
             for (index, place) in places.iter_mut().enumerate() {
                 let rays = [self.ray(index)];
                 let batch = RayBatch::new(&rays, index).under(self.conditions());
-                *place = self.hits_of(memory, (&batch, 0), &mut hits);
+                *place = hits_of(self.moment(index), memory, (&batch, 0), &mut hits);
             }
         });
         vec![hits]
-    }
-
-    /// Adds the hits of a ray to a list.
-    fn hits_of(
-        &self,
-        memory: &mut Memory,
-        (batch, index): (&RayBatch<'_>, usize),
-        hits: &mut Vec<Hit>,
-    ) -> Place {
-        let first = hits.len();
-        let ray = &batch.rays[index];
-        batch.with_condition(index, |condition| {
-            (self.bvh).visit_ahead(&mut memory.ahead, ray, condition, &mut |hit| {
-                hits.push(hit);
-                Visit::Reject
-            })
-        });
-        Place {
-            list: 0,
-            first,
-            len: hits.len() - first,
-        }
     }
 
     /// Number of hits in the interval of each ray: item `i` answers ray `i`. Takes no memory for the hits, and as long as
@@ -178,12 +162,12 @@ impl Batch<'_> {
             CHUNK,
             0..counts.len(),
             &mut counts,
-            &|memory, batch, counts| {
+            &|bvh, memory, batch, counts| {
                 for (index, count) in counts.iter_mut().enumerate() {
                     *count = 0;
-                    let ray = &batch.rays[index];
+                    let (ray, moment) = (&batch.rays[index], bvh.moment_of(batch, index));
                     batch.with_condition(index, |condition| {
-                        (self.bvh).visit_ahead(&mut memory.ahead, ray, condition, &mut |_| {
+                        moment.visit_ahead(&mut memory.ahead, ray, condition, &mut |_| {
                             *count += 1;
                             Visit::Reject
                         })
@@ -192,5 +176,27 @@ impl Batch<'_> {
             },
         );
         counts
+    }
+}
+
+/// Adds the hits of a ray to a list.
+fn hits_of(
+    moment: Moment<'_>,
+    memory: &mut Memory,
+    (batch, index): (&RayBatch<'_>, usize),
+    hits: &mut Vec<Hit>,
+) -> Place {
+    let first = hits.len();
+    let ray = &batch.rays[index];
+    batch.with_condition(index, |condition| {
+        moment.visit_ahead(&mut memory.ahead, ray, condition, &mut |hit| {
+            hits.push(hit);
+            Visit::Reject
+        })
+    });
+    Place {
+        list: 0,
+        first,
+        len: hits.len() - first,
     }
 }

@@ -7,6 +7,7 @@ use antumbra_simd::{Dispatch, Level};
 
 use super::batch::CHUNK;
 use super::bvh::Bvh;
+use super::moving::Moment;
 use crate::geometry::ray_setup::RaySetup;
 use crate::learn::ray_log::{Following, RayLog};
 use crate::ray::{Hit, Ray};
@@ -21,6 +22,7 @@ use crate::trace::ray_batch::RayBatch;
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::trace::stream::{self, Stream};
+use crate::trace::view::{Shares, Still, Views, on_view};
 use crate::tree::any::on_tree;
 
 /// Fewer rays than this are not worth a stream.
@@ -45,12 +47,12 @@ impl Bvh {
             return self.many::<Occlusion>(memory, batch, occluded);
         }
         if !batch.decides() {
-            return self.occluded_each(memory, batch.rays, occluded);
+            return self.occluded_each(memory, batch, occluded);
         }
         for (index, occluded) in occluded.iter_mut().enumerate() {
-            let ray = &batch.rays[index];
+            let (ray, moment) = (&batch.rays[index], self.moment_of(batch, index));
             let occluder =
-                batch.with_condition(index, |condition| self.occluder_when(ray, condition));
+                batch.with_condition(index, |condition| moment.occluder_when(ray, condition));
             *occluded = occluder.is_some();
             if let Some(occluder) = occluder {
                 batch.report_occluder(index, occluder);
@@ -76,12 +78,12 @@ impl Bvh {
                 _ => self.many::<Closest>(memory, batch, hits),
             };
         }
-        self.each::<Closest>(memory, batch.rays, hits);
+        self.each::<Closest>(memory, batch, hits);
         if batch.decides() {
             for (index, hit) in hits.iter_mut().enumerate() {
-                let ray = &batch.rays[index];
+                let (ray, moment) = (&batch.rays[index], self.moment_of(batch, index));
                 *hit = batch
-                    .with_condition(index, |condition| self.closest_when(ray, condition, *hit));
+                    .with_condition(index, |condition| moment.closest_when(ray, condition, *hit));
             }
         }
     }
@@ -97,9 +99,9 @@ impl Bvh {
             Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
         for (index, (ray, hit)) in batch.rays.iter().zip(hits).enumerate() {
             let found = batch.with_condition(index, |condition| {
-                on_tree!(&self.tree, bvh => {
-                    closest_with_leaf(bvh, stack, ray, condition)
-                })
+                on_tree!(&self.tree, bvh => on_view!(batch.share(index), view => {
+                    closest_with_leaf((bvh, view), stack, ray, condition)
+                }))
             });
             *hit = found.map(|found| found.hit.told());
             if let Some(found) = found {
@@ -115,10 +117,15 @@ impl Bvh {
     }
 
     /// Occlusion ray by ray.
-    pub(crate) fn occluded_each(&self, memory: &mut Memory, rays: &[Ray], occluded: &mut [bool]) {
+    pub(crate) fn occluded_each(
+        &self,
+        memory: &mut Memory,
+        batch: &RayBatch<'_>,
+        occluded: &mut [bool],
+    ) {
         match self.tree.pick {
-            None => self.each::<Occlusion>(memory, rays, occluded),
-            Some(_) => self.instrumented(memory, Pick::Rule, &mut Nothing, rays, occluded),
+            None => self.each::<Occlusion>(memory, batch, occluded),
+            Some(_) => self.instrumented(memory, Pick::Rule, &mut Nothing, batch.rays, occluded),
         }
     }
 
@@ -170,7 +177,7 @@ impl Bvh {
         memory.pending = pending;
     }
 
-    /// Answers the rays that go in packets; the others become pending.
+    /// Answers the rays that go in packets; the others become pending, and so do all that look at times.
     fn packets<Q: PacketQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
@@ -178,6 +185,9 @@ impl Bvh {
         answers: &mut [Q::Answer],
         pending: &mut Vec<u32>,
     ) {
+        if batch.shares().is_some() {
+            return pending.extend(0..batch.rays.len() as u32);
+        }
         let stack = Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
         on_tree!(&self.tree, bvh => {
             self.isa().dispatch_vectors(Packets::<Q, _> { bvh, stack, batch, answers, pending });
@@ -207,12 +217,30 @@ impl Bvh {
         pending: &[u32],
         answers: &mut [Q::Answer],
     ) {
+        match batch.shares() {
+            None => self.stream_seen::<Q, _, CAREFUL>(memory, Still, batch, pending, answers),
+            Some(shares) => {
+                let views = Shares(shares);
+                self.stream_seen::<Q, _, CAREFUL>(memory, views, batch, pending, answers);
+            }
+        }
+    }
+
+    fn stream_seen<Q: StreamQuery<Item: Stored>, V: Views, const CAREFUL: bool>(
+        &self,
+        memory: &mut Memory,
+        views: V,
+        batch: &RayBatch<'_>,
+        pending: &[u32],
+        answers: &mut [Q::Answer],
+    ) {
         let mut setups = core::mem::take(&mut memory.setups);
         setups.resize(stream::SETUPS, RaySetup::IDLE);
         let items = Stored::at_least(memory, stream::items(self.width().lanes(), self.depth()));
         on_tree!(&self.tree, bvh => {
-            self.isa().dispatch_vectors(Stream::<Q, _, CAREFUL> {
+            self.isa().dispatch_vectors(Stream::<Q, V, _, CAREFUL> {
                 bvh,
+                views,
                 items,
                 setups: &mut setups,
                 batch,
@@ -228,14 +256,30 @@ impl Bvh {
     pub(crate) fn each<Q: Query<Item: Stored>>(
         &self,
         memory: &mut Memory,
-        rays: &[Ray],
+        batch: &RayBatch<'_>,
         answers: &mut [Q::Answer],
     ) {
+        let rays = batch.rays;
         assert_eq!(rays.len(), answers.len(), "one answer per ray");
         let stack = Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
-        on_tree!(&self.tree, bvh => {
-            self.isa().dispatch(Single::<Q, _> { bvh, stack, rays, answers });
+        on_tree!(&self.tree, bvh => match batch.shares() {
+            None => {
+                let views = Still;
+                self.isa().dispatch(Single::<Q, _, _> { bvh, views, stack, rays, answers });
+            }
+            Some(shares) => {
+                let views = Shares(shares);
+                self.isa().dispatch(Single::<Q, _, _> { bvh, views, stack, rays, answers });
+            }
         });
+    }
+
+    /// This tree as a ray of a batch looks at it.
+    pub(super) fn moment_of(&self, batch: &RayBatch<'_>, index: usize) -> Moment<'_> {
+        Moment {
+            bvh: self,
+            share: batch.share(index),
+        }
     }
 
     pub(crate) fn counting<'a>(&self, costs: &'a mut [Cost]) -> Counting<'a> {

@@ -10,10 +10,8 @@ use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::brute::Brute;
 use crate::trace::condition::Condition;
-use crate::trace::conditional::Conditional;
-use crate::trace::visit::{Ahead, Visit, Visiting};
+use crate::trace::visit::Visit;
 use crate::tree::any::on_tree;
-use antumbra_simd::Dispatch;
 
 /// A ray and conditions on what it may hit. Made by [`Bvh::query`]; nothing happens before the last call, which names the
 /// query.
@@ -44,6 +42,7 @@ pub struct RayQuery<'a> {
     mask: Option<u32>,
     excluded: PrimId,
     filter: Option<&'a dyn Fn(&Hit) -> bool>,
+    time: Option<f32>,
 }
 
 /// Where the ray is traced.
@@ -85,63 +84,6 @@ impl Bvh {
             placed.map(|placed| (placed.placement.inst_id, placed.object)).collect()
         })
     }
-
-    /// Whether anything that satisfies a condition occludes a ray.
-    pub(super) fn occluded_when(&self, ray: &Ray, condition: &Condition<'_>) -> bool {
-        if condition.is_none() {
-            return self.occluded(ray);
-        }
-        self.occluder_when(ray, condition).is_some()
-    }
-
-    /// The first occluder found that satisfies a condition.
-    pub(super) fn occluder_when(&self, ray: &Ray, condition: &Condition<'_>) -> Option<PrimId> {
-        self.with_stack(|stack: &mut [u32]| {
-            on_tree!(&self.tree, bvh => {
-                self.isa().dispatch(Conditional { bvh, stack, ray, condition })
-            })
-        })
-    }
-
-    /// The closest hit that satisfies a condition, given the closest one of all.
-    pub(super) fn closest_when(
-        &self,
-        ray: &Ray,
-        condition: &Condition<'_>,
-        closest: Option<Hit>,
-    ) -> Option<Hit> {
-        if closest.is_none_or(|hit| condition.counts(&hit)) {
-            return closest;
-        }
-        self.visit_when(ray, condition, &mut |_| Visit::Accept)
-    }
-
-    /// Calls `visit` with the hits that satisfy a condition, front to back.
-    pub(super) fn visit_when(
-        &self,
-        ray: &Ray,
-        condition: &Condition<'_>,
-        visit: &mut dyn FnMut(Hit) -> Visit,
-    ) -> Option<Hit> {
-        (self.pool).with(|memory| self.visit_ahead(&mut memory.ahead, ray, condition, visit))
-    }
-
-    /// [`Bvh::visit_when`] in the memory given.
-    pub(super) fn visit_ahead(
-        &self,
-        ahead: &mut Ahead,
-        ray: &Ray,
-        condition: &Condition<'_>,
-        visit: &mut dyn FnMut(Hit) -> Visit,
-    ) -> Option<Hit> {
-        let visit = &mut |hit: Hit| match condition.counts(&hit) {
-            true => visit(hit),
-            false => Visit::Reject,
-        };
-        on_tree!(&self.tree, bvh => {
-            self.isa().dispatch(Visiting { bvh, ahead, ray, condition: Some(condition), visit })
-        })
-    }
 }
 
 impl Brute {
@@ -167,6 +109,7 @@ impl<'a> RayQuery<'a> {
             mask: None,
             excluded: PrimId::NONE,
             filter: None,
+            time: None,
         }
     }
 
@@ -211,13 +154,22 @@ impl<'a> RayQuery<'a> {
         }
     }
 
+    /// Looks at the scene at a time from 0 to 1: see [`Bvh::moving`]. A time outside is clamped, and NaN counts as 0. Changes
+    /// nothing where nothing moves.
+    pub fn at(self, time: f32) -> Self {
+        Self {
+            time: Some(time),
+            ..self
+        }
+    }
+
     /// Whether anything that counts lies in the ray's interval.
     #[must_use]
     pub fn occluded(self) -> bool {
         let condition = self.condition();
         match self.scene {
-            Scene::Tree(bvh) => bvh.occluded_when(&self.ray, &condition),
-            Scene::Brute(brute) => brute.occluded_when(&self.ray, &condition),
+            Scene::Tree(bvh) => bvh.moment(self.time).occluded_when(&self.ray, &condition),
+            Scene::Brute(brute) => brute.at(self.time).occluded_when(&self.ray, &condition),
         }
     }
 
@@ -227,7 +179,7 @@ impl<'a> RayQuery<'a> {
     pub fn occluder(self) -> Option<PrimId> {
         let condition = self.condition();
         match self.scene {
-            Scene::Tree(bvh) => bvh.occluder_when(&self.ray, &condition),
+            Scene::Tree(bvh) => bvh.moment(self.time).occluder_when(&self.ray, &condition),
             Scene::Brute(_) => self.visit_hits(|_| Visit::Accept).map(PrimId::from),
         }
     }
@@ -240,8 +192,8 @@ impl<'a> RayQuery<'a> {
         let condition = self.condition();
         match self.scene {
             Scene::Tree(bvh) => {
-                let closest = bvh.intersect(&self.ray);
-                bvh.closest_when(&self.ray, &condition, closest)
+                let moment = bvh.moment(self.time);
+                moment.closest_when(&self.ray, &condition, moment.intersect(&self.ray))
             }
             Scene::Brute(_) => self.visit_hits(|_| Visit::Accept),
         }
@@ -286,9 +238,11 @@ impl<'a> RayQuery<'a> {
     pub fn visit_hits(self, mut visit: impl FnMut(Hit) -> Visit) -> Option<Hit> {
         let condition = self.condition();
         match self.scene {
-            Scene::Tree(bvh) => bvh.visit_when(&self.ray, &condition, &mut visit),
+            Scene::Tree(bvh) => {
+                (bvh.moment(self.time)).visit_when(&self.ray, &condition, &mut visit)
+            }
             Scene::Brute(brute) => {
-                let mut hits = brute.all_hits(&self.ray).into_iter();
+                let mut hits = brute.at(self.time).all_hits(&self.ray).into_iter();
                 hits.find_map(|hit| match condition.counts(&hit) {
                     true => match visit(hit) {
                         Visit::Accept => Some(Some(hit)),
@@ -344,6 +298,7 @@ impl fmt::Debug for RayQuery<'_> {
             .field("mask", &self.mask)
             .field("excluded", &self.excluded)
             .field("has_filter", &self.filter.is_some())
+            .field("time", &self.time)
             .finish_non_exhaustive()
     }
 }

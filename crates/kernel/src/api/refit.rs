@@ -37,8 +37,10 @@ impl Bvh {
     /// - a vertex index is out of range,
     /// - a primitive that was dropped at build is sound now, or one of the tree is not: [`Error::OtherPrimitives`],
     ///   [`Error::PrimitiveIsGone`],
+    /// - the tree or one of the geometries moves while rays are traced: [`Error::Moves`],
     /// - the tree has instances: [`Error::HasInstances`]; a [`World`](crate::World) refits its objects.
     pub fn refit(&mut self, geometries: &[Geometry<'_>]) -> Result<(), Error> {
+        self.stands_still("a tree that moves cannot be refitted")?;
         if !self.tree.roots.is_empty() {
             return Err(Error::HasInstances);
         }

@@ -49,12 +49,16 @@ pub trait Contents: Sized {
     fn read_words(words: &mut Words<'_>, functions: &Functions) -> Result<Self, Error>;
 }
 
+const UNSAVED: &str = "a tree that moves cannot be saved";
+
 #[cfg(feature = "std")]
 fn write(saved: &impl Contents, out: impl Write) -> Result<(), Error> {
+    saved.tree().stands_still(UNSAVED)?;
     words::write(kind_of(saved), out, |sink| saved.write_words(sink))
 }
 
 fn to_bytes(saved: &impl Contents) -> Vec<u8> {
+    assert!(!saved.tree().moves(), "{UNSAVED}");
     let most = saved.tree().tree.file_bytes();
     words::to_bytes(kind_of(saved), most, |sink| saved.write_words(sink))
 }
@@ -98,7 +102,7 @@ impl Bvh {
     /// pieces, and takes about as long as a copy of it.
     ///
     /// # Errors
-    /// [`Error::Io`] if writing fails.
+    /// [`Error::Io`] if writing fails, [`Error::Moves`] for a tree that moves.
     #[cfg(feature = "std")]
     pub fn write(&self, out: impl Write) -> Result<(), Error> {
         write(self, out)
@@ -133,6 +137,9 @@ impl Bvh {
     }
 
     /// The bytes that [`Bvh::write`] writes.
+    ///
+    /// # Panics
+    /// If the tree [moves](Bvh::moves), for which [`Bvh::write`] returns an error.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         to_bytes(self)
@@ -174,6 +181,7 @@ impl Bvh {
             times: None,
             built_sah,
             masks: None,
+            later: Vec::new(),
         };
         Ok((bvh, walked))
     }

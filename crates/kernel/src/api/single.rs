@@ -14,6 +14,7 @@ use crate::trace::ray_batch::{LocatedHit, RayBatch, Report};
 use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::trace::surface::{Surface, surface, unit};
+use crate::trace::view::{Still, Views, on_view};
 use crate::tree::any::on_tree;
 
 /// Items of a stack on the program stack: enough for 32 levels of 16 children, 71 of 8 and 167 of 4. Items that a tree
@@ -37,12 +38,12 @@ impl Bvh {
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
         if self.tree.pick.is_none() {
-            return self.one::<Occlusion>(ray);
+            return self.one::<Occlusion>(ray, Still);
         }
         let mut answer = [false];
-        let rays = core::slice::from_ref(ray);
+        let batch = RayBatch::new(core::slice::from_ref(ray), 0);
         self.pool
-            .with(|memory| self.occluded_each(memory, rays, &mut answer));
+            .with(|memory| self.occluded_each(memory, &batch, &mut answer));
         answer[0]
     }
 
@@ -61,7 +62,7 @@ impl Bvh {
     /// ```
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.one::<Closest>(ray)
+        self.one::<Closest>(ray, Still)
     }
 
     /// Geometric normal at a hit, in the world and of length 1. `ray` is the ray of the query, and `hit` its hit.
@@ -71,7 +72,8 @@ impl Bvh {
     /// was hit. User geometry computes its own: [`UserGeometry::normal`](crate::UserGeometry::normal).
     ///
     /// Finds the primitive by its ids along the ray, which takes about as long as a query of one ray. `None` if the ray
-    /// comes by no such primitive, if the three corners lie on a line, or if user geometry returns none.
+    /// comes by no such primitive, if the three corners lie on a line, or if user geometry returns none. Where something moves,
+    /// the normal is that of time 0: for other times see [`Batch::surfaces`](crate::Batch::surfaces).
     ///
     /// ```
     /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
@@ -134,9 +136,10 @@ impl Bvh {
         hits.resize(surfaces.len(), None);
         let cells = Cell::from_mut(surfaces).as_slice_of_cells();
         let report = |index: usize, ray: &Ray, found: &LocatedHit| {
-            cells[index].set(Some(
-                on_tree!(&self.tree, tree => surface(tree, ray, found)),
-            ));
+            let surface = on_tree!(&self.tree, tree => on_view!(batch.share(index), view => {
+                surface(tree, view, ray, found)
+            }));
+            cells[index].set(Some(surface));
         };
         self.intersect_many(
             memory,
@@ -146,12 +149,16 @@ impl Bvh {
         memory.hits = hits;
     }
 
-    pub(super) fn one<Q: Query<Item: Stored + Bits>>(&self, ray: &Ray) -> Q::Answer {
+    pub(super) fn one<Q: Query<Item: Stored + Bits>>(
+        &self,
+        ray: &Ray,
+        views: impl Views,
+    ) -> Q::Answer {
         let mut answer = [Q::miss()];
         self.with_stack(|stack: &mut [Q::Item]| {
             let (rays, answers) = (core::slice::from_ref(ray), &mut answer[..]);
             on_tree!(&self.tree, bvh => {
-                self.isa().dispatch(Single::<Q, _> { bvh, stack, rays, answers });
+                self.isa().dispatch(Single::<Q, _, _> { bvh, views, stack, rays, answers });
             });
         });
         let [answer] = answer;

@@ -3,9 +3,11 @@
 use alloc::vec;
 use alloc::vec::Vec;
 use core::cell::Cell;
+use core::ops::Range;
 use core::sync::atomic::{AtomicUsize, Ordering};
 
 use super::batch::Batch;
+use super::bvh::Bvh;
 use crate::parallel::for_each;
 use crate::ray::{Hit, Ray};
 use crate::trace::memory::Memory;
@@ -67,14 +69,34 @@ impl Batch<'_> {
         visit: &impl Fn(&mut T, Hit) -> Visit,
         so_far: &HitsSoFar,
     ) {
-        let len = states.len();
-        let mut open = Open::new((first..first + len).map(|place| self.ray(place)).collect());
-        if !self.bvh.is_worth_a_stream(len) {
+        for (span, bvh) in self.trees() {
+            let open = Open::new(self, span, first..first + states.len());
+            self.visit_open(memory, bvh, first, open, states, visit, so_far);
+        }
+    }
+
+    /// Visits what rays of one span hit.
+    fn visit_open<T>(
+        &self,
+        memory: &mut Memory,
+        bvh: &Bvh,
+        first: usize,
+        mut open: Open,
+        states: &mut [T],
+        visit: &impl Fn(&mut T, Hit) -> Visit,
+        so_far: &HitsSoFar,
+    ) {
+        let len = open.rays.len();
+        if !bvh.is_worth_a_stream(len) {
             let batch = open.batch(first).under(self.conditions());
-            for (index, state) in states.iter_mut().enumerate() {
+            for (index, ray) in open.rays.iter().enumerate() {
+                let (state, moment) = (
+                    &mut states[open.keys[index].index()],
+                    bvh.moment_of(&batch, index),
+                );
                 batch.with_condition(index, |condition| {
-                    let (ray, visit) = (&open.rays[index], &mut |hit| visit(state, hit));
-                    (self.bvh).visit_ahead(&mut memory.ahead, ray, condition, visit)
+                    let visit = &mut |hit| visit(state, hit);
+                    moment.visit_ahead(&mut memory.ahead, ray, condition, visit)
                 });
             }
             return;
@@ -91,7 +113,7 @@ impl Batch<'_> {
                 |index: usize, _: &Ray, found: &LocatedHit| cells[index].set(Some(found.hit));
             let batch = open.batch(first).under(self.conditions());
             let batch = batch.reporting(Report::Surface(&report));
-            self.bvh.intersect_many(memory, &batch, &mut closest);
+            bvh.intersect_many(memory, &batch, &mut closest);
             open.retain(|index, place| found[index].filter(|hit| goes_on(place, hit)));
         }
         let mut lists = vec![NearestHits::default(); open.rays.len()];
@@ -100,12 +122,7 @@ impl Batch<'_> {
             let len = open.rays.len();
             let batch = open.batch(first).under(self.conditions());
             let batch = batch.behind(&open.after);
-            (self.bvh).stream_of::<Nearest, true>(
-                memory,
-                &batch,
-                &pending[..len],
-                &mut lists[..len],
-            );
+            bvh.stream_of::<Nearest, true>(memory, &batch, &pending[..len], &mut lists[..len]);
             open.retain(|index, place| {
                 let list = &lists[index];
                 let is_open = list.hits().iter().all(|hit| goes_on(place, hit));
@@ -121,28 +138,35 @@ struct Open {
     rays: Vec<Ray>,
     /// Per ray, its place in this part of the batch.
     keys: Vec<Key>,
+    /// Per ray, its share of the span at which it looks at a tree that moves.
+    shares: Option<Vec<f32>>,
     /// Per ray, the hit behind which its visit continues.
     after: Vec<Hit>,
 }
 
 impl Open {
-    /// Opens the visits of all these rays.
-    fn new(rays: Vec<Ray>) -> Self {
+    /// Opens the visits of the rays of a span at these places of a batch.
+    fn new(batch: &Batch<'_>, span: usize, places: Range<usize>) -> Self {
         /// A hit before all hits.
         const FIRST: Hit = Hit {
             t: f32::NEG_INFINITY,
             ..Hit::none(0.0)
         };
+        let first = places.start;
+        let own = places.filter(|place| batch.is_in(span, *place));
+        let keys: Vec<Key> = own.map(|place| Key::at(place - first)).collect();
+        let places = keys.iter().map(|key| first + key.index());
         Self {
-            keys: (0..rays.len()).map(Key::at).collect(),
-            after: vec![FIRST; rays.len()],
-            rays,
+            rays: places.clone().map(|place| batch.ray(place)).collect(),
+            shares: places.map(|place| batch.share(place)).collect(),
+            after: vec![FIRST; keys.len()],
+            keys,
         }
     }
 
     /// The rays as a part of a batch that begins at this place.
     fn batch(&self, first: usize) -> RayBatch<'_> {
-        RayBatch::by_keys(&self.rays, first, &self.keys)
+        RayBatch::by_keys(&self.rays, first, &self.keys).at(self.shares.as_deref())
     }
 
     /// Keeps the rays whose visit continues behind a hit. `goes_on` is called with index and place of each ray, and
@@ -152,12 +176,18 @@ impl Open {
         for index in 0..self.rays.len() {
             if let Some(hit) = goes_on(index, self.keys[index].index()) {
                 (self.rays[next], self.keys[next]) = (self.rays[index], self.keys[index]);
+                if let Some(shares) = &mut self.shares {
+                    shares[next] = shares[index];
+                }
                 self.after[next] = hit;
                 next += 1;
             }
         }
         self.rays.truncate(next);
         self.keys.truncate(next);
+        self.shares
+            .iter_mut()
+            .for_each(|shares| shares.truncate(next));
         self.after.truncate(next);
     }
 }

@@ -24,7 +24,7 @@ use crate::words::{Sink, Words};
 /// assert!(world.occluded(&Ray::new([-0.2, 0.2, 0.0], [0.0, 0.0, 1.0])));
 /// # Ok::<(), antumbra::Error>(())
 /// ```
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Instance {
     /// Index of the object in the list of objects. An index out of range is an error at build.
@@ -34,13 +34,19 @@ pub struct Instance {
     /// its transform has a NaN or infinite number, has no inverse, or brings the object or its inverse out of
     /// the range of `f32`.
     pub transform: [[f32; 4]; 3],
+    /// Transforms at later keys, where the instance moves while rays are traced: see [`Instance::moving`].
+    pub moves_to: Vec<[[f32; 4]; 3]>,
 }
 
 impl Instance {
     /// Places an object, named by its index in the list of objects, by an affine transform from the object to the world.
     #[must_use]
     pub const fn new(object: u32, transform: [[f32; 4]; 3]) -> Self {
-        Self { object, transform }
+        Self {
+            object,
+            transform,
+            moves_to: Vec::new(),
+        }
     }
 }
 

@@ -55,6 +55,7 @@ pub(crate) mod winding;
 
 use alloc::borrow::Cow;
 use alloc::sync::Arc;
+use alloc::vec::Vec;
 
 pub use cutout::opacity::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 
@@ -64,7 +65,6 @@ pub use disk::Disk;
 pub use functions::{Functions, GeometryId};
 pub use instance::Instance;
 pub use local::LocalOrigin;
-pub use motion::{MovingGeometry, MovingInstance, MovingMesh, MovingScene};
 pub use nested::NestedInstances;
 pub use user::{UserGeometry, UserHit};
 
@@ -93,6 +93,9 @@ pub struct TriangleMesh<'a> {
     pub indices: Cow<'a, [[u32; 3]]>,
     /// Filter that returns how opaque the triangles are. Without one all of them are opaque.
     pub opacity: Option<Arc<dyn Opacity>>,
+    /// Positions at later keys, each as long as `positions`, where the mesh moves while rays are traced: see
+    /// [`Geometry::moving`].
+    pub moves_to: Vec<Cow<'a, [[f32; 3]]>>,
 }
 
 impl<'a> TriangleMesh<'a> {
@@ -106,6 +109,7 @@ impl<'a> TriangleMesh<'a> {
             positions: positions.into(),
             indices: indices.into(),
             opacity: None,
+            moves_to: Vec::new(),
         }
     }
 }

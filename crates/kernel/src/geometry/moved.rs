@@ -23,10 +23,11 @@ impl<'a> Moved<'a> {
     /// Checks geometries that are to have `kept` sound primitives.
     ///
     /// # Errors
-    /// A vertex index out of range; another number of sound primitives.
+    /// A vertex index out of range; another number of sound primitives; geometry that moves while rays are traced.
     pub fn new(geometries: &'a [Geometry<'a>], kept: usize) -> Result<Self, Error> {
         let (mut sound, mut all) = (0, 0);
         for geometry in geometries {
+            geometry.stands_still("a refit cannot make geometry move while rays are traced")?;
             sound += count_sound(geometry);
             all += geometry.count();
         }

@@ -60,6 +60,7 @@ impl NestedInstances {
     /// - [`Error::ObjectOutOfRange`] for an object that is not in `inside`; `inst_id` is the place in the list of the world, or
     ///   of the object that holds the instance.
     /// - [`Error::NestsItself`] for a circle.
+    /// - [`Error::Moves`] for an instance that moves while rays are traced.
     /// - [`Error::TooMany`] for more than 2²⁹ - 2 paths, ends without geometry included.
     pub fn new(
         world: &[Instance],
@@ -80,6 +81,7 @@ impl NestedInstances {
                 continue;
             };
             open.push((before, outer, (object, place + 1)));
+            instance.stands_still("instances inside of objects cannot move")?;
             let inner = Affine::new(&instance.transform);
             let product = match &outer {
                 Some(outer) => outer.times(&inner),

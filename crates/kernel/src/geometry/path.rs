@@ -278,17 +278,24 @@ impl MovingPlacement {
         array::from_fn(|side| between(&start[side], &end[side], share))
     }
 
-    /// The placement at a share of the way, with the box of that time. `None` where the transform has no inverse, which
-    /// only rounding can bring about.
+    /// The transform at a share of the way.
+    pub fn transform(&self, share: f32) -> [[f32; 4]; 3] {
+        self.interpolation.transform(share)
+    }
+
+    /// The placement at a share of the way, with the box of that time, and the transform. `None` where the transform has no
+    /// inverse, which only rounding can bring about.
     #[inline(never)]
-    pub fn at(&self, share: f32, planes: [[f32; 4]; 2]) -> Option<Placement> {
-        let inverse = Affine::new(&self.interpolation.transform(share)).inverse()?;
-        Some(Placement {
+    pub fn at(&self, share: f32, planes: [[f32; 4]; 2]) -> Option<(Placement, [[f32; 4]; 3])> {
+        let world_from_object = self.transform(share);
+        let inverse = Affine::new(&world_from_object).inverse()?;
+        let placement = Placement {
             object_from_world: inverse.columns(),
             reach: self.reach,
             planes,
             inst_id: self.inst_id,
-        })
+        };
+        Some((placement, world_from_object))
     }
 }
 

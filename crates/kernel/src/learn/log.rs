@@ -291,9 +291,11 @@ mod tests {
         let [object, world] = [&object, &world]
             .map(|mesh| [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])]);
         let instances: Vec<_> = (0..30)
-            .map(|_| Instance {
-                object: 0,
-                transform: core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-1.0, 1.0))),
+            .map(|_| {
+                Instance::new(
+                    0,
+                    core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-1.0, 1.0))),
+                )
             })
             .collect();
         let primitives =

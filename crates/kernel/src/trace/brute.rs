@@ -1,6 +1,7 @@
 //! No tree at all: every primitive against every ray, in plain scalar code. The oracle that every tree,
 //! order and level is compared with, and the first thing to try when an answer is in doubt.
 
+use alloc::borrow::Cow;
 use alloc::vec::Vec;
 
 use antumbra_simd::Scalar;
@@ -46,6 +47,18 @@ impl Brute {
             primitives: primitives.clone(),
             reach,
             masks: None,
+        }
+    }
+
+    /// The scene at a time, or as it is.
+    pub(crate) fn at(&self, time: Option<f32>) -> Cow<'_, Self> {
+        match time {
+            Some(time) if self.primitives.moves() => Cow::Owned(Self {
+                primitives: self.primitives.at(time),
+                reach: self.reach,
+                masks: self.masks.clone(),
+            }),
+            _ => Cow::Borrowed(self),
         }
     }
 

@@ -13,13 +13,13 @@ use crate::trace::query::{Closest, Query};
 use crate::trace::ray_batch::LocatedHit;
 use crate::trace::single::traverse;
 use crate::trace::stack::Stack;
-use crate::tree::leaves::on_leaf;
+use crate::trace::view::{View, on_seen_leaf};
 use crate::tree::node::{Child, Leaf};
 use crate::tree::wide::WideTree;
 
 /// The closest hit that fulfils a condition, with its leaf. `stack` is memory of one for this tree.
 pub(crate) fn closest_with_leaf<const N: usize>(
-    bvh: &WideTree<N>,
+    (bvh, view): (&WideTree<N>, impl View),
     stack: &mut [u64],
     ray: &Ray,
     condition: &Condition<'_>,
@@ -38,7 +38,7 @@ where
         ..ClosestWithLeaf::IDLE
     };
     let (setups, stack) = ((&setup, &mut object), Stack::new(stack, 0));
-    traverse::<Scalar, N, ClosestWithLeaf<'_>>(Scalar, bvh, setups, stack, state)
+    traverse::<Scalar, N, ClosestWithLeaf<'_>, _>(Scalar, bvh, view, setups, stack, state)
 }
 
 /// [`Closest`] with the leaf of the hit.
@@ -80,17 +80,24 @@ impl<'a> Query for ClosestWithLeaf<'a> {
         known.best.limit
     }
 
-    fn leaf<S: Simd, const N: usize>(
+    fn leaf<S: Simd, V: View, const N: usize>(
         known: &mut Known<'a>,
         stack: &mut Stack<'_, u64>,
         simd: S,
         bvh: &WideTree<N>,
+        view: V,
         leaf: Leaf,
         ray: &RaySetup,
     ) {
         let limit = known.best.limit;
-        let lanes = on_leaf!(bvh, leaf, block => block.candidates::<S, false>(simd, ray, limit).0);
-        if improve_when(bvh, (leaf, lanes), ray, &mut known.best, known.condition) {
+        let lanes = on_seen_leaf!(simd, bvh, view, leaf, block => block.candidates::<S, false>(simd, ray, limit).0);
+        if improve_when(
+            (bvh, view),
+            (leaf, lanes),
+            ray,
+            &mut known.best,
+            known.condition,
+        ) {
             known.leaf = (Child::leaf(leaf), known.here);
             Closest::cull(&known.best, stack, simd);
         }

@@ -3,7 +3,7 @@
 //!
 //! Conditions other than a primitive that is left out are decided lane by lane, in code that is compiled once.
 
-use antumbra_simd::{Simd, Width, WithSimd};
+use antumbra_simd::{Scalar, Simd, Width, WithSimd};
 
 use crate::geometry::best::Best;
 use crate::geometry::cutout::Filters;
@@ -19,21 +19,22 @@ use crate::trace::condition::Condition;
 use crate::trace::query::Query;
 use crate::trace::single::traverse;
 use crate::trace::stack::Stack;
-use crate::tree::leaves::on_leaf;
+use crate::trace::view::{View, on_seen_leaf};
 use crate::tree::node::Leaf;
 use crate::tree::wide::WideTree;
 
 /// Occlusion of a ray by hits that fulfil a condition. The occluder is the first that is found, which depends on the
 /// tree.
-pub(crate) struct Conditional<'a, const N: usize> {
+pub(crate) struct Conditional<'a, V, const N: usize> {
     pub bvh: &'a WideTree<'a, N>,
+    pub view: V,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [u32],
     pub ray: &'a Ray,
     pub condition: &'a Condition<'a>,
 }
 
-impl<const N: usize> WithSimd<N> for Conditional<'_, N> {
+impl<V: View, const N: usize> WithSimd<N> for Conditional<'_, V, N> {
     type Output = Option<PrimId>;
 
     #[inline(always)]
@@ -49,7 +50,7 @@ impl<const N: usize> WithSimd<N> for Conditional<'_, N> {
                 ..OcclusionIf::IDLE
             };
             let setups = (&setup, &mut object);
-            traverse::<S, N, OcclusionIf<'_>>(simd, self.bvh, setups, stack, state)
+            traverse::<S, N, OcclusionIf<'_>, V>(simd, self.bvh, self.view, setups, stack, state)
         } else {
             None
         }
@@ -60,7 +61,7 @@ impl<const N: usize> WithSimd<N> for Conditional<'_, N> {
 /// instance where the ray is.
 #[inline(never)]
 pub(crate) fn occluder_when<const N: usize>(
-    bvh: &WideTree<N>,
+    (bvh, view): (&WideTree<N>, impl View),
     (leaf, lanes): (Leaf, u32),
     ray: &RaySetup,
     interval: Interval,
@@ -72,20 +73,20 @@ pub(crate) fn occluder_when<const N: usize>(
         interval,
         occluder: None,
     };
-    on_leaf!(bvh, leaf, block => known.first(block, LanesOf(lanes), ray, &bvh.filters))
+    on_seen_leaf!(Scalar, bvh, view, leaf, block => known.first(block, LanesOf(lanes), ray, &bvh.filters))
 }
 
 /// Replaces `best` by the closest hit in these lanes of a leaf that fulfils a condition, where that precedes it, and
 /// returns whether it did.
 #[inline(never)]
 pub(crate) fn improve_when<const N: usize>(
-    bvh: &WideTree<N>,
+    (bvh, view): (&WideTree<N>, impl View),
     (leaf, lanes): (Leaf, u32),
     ray: &RaySetup,
     best: &mut Best,
     condition: &Condition<'_>,
 ) -> bool {
-    on_leaf!(bvh, leaf, block => improve(block, LanesOf(lanes), ray, &bvh.filters, (best, condition)))
+    on_seen_leaf!(Scalar, bvh, view, leaf, block => improve(block, LanesOf(lanes), ray, &bvh.filters, (best, condition)))
 }
 
 fn improve<B: LeafBlock>(
@@ -240,16 +241,18 @@ impl<'a> Query for OcclusionIf<'a> {
     }
 
     #[inline(always)]
-    fn leaf<S: Simd, const N: usize>(
+    fn leaf<S: Simd, V: View, const N: usize>(
         known: &mut Known<'a>,
         stack: &mut Stack<'_, u32>,
         simd: S,
         bvh: &WideTree<N>,
+        view: V,
         leaf: Leaf,
         ray: &RaySetup,
     ) {
         let filters = &bvh.filters;
-        known.occluder = on_leaf!(bvh, leaf, block => known.block(simd, block, ray, filters));
+        known.occluder =
+            on_seen_leaf!(simd, bvh, view, leaf, block => known.block(simd, block, ray, filters));
         stack.clear_if(known.occluder.is_some());
     }
 

@@ -103,7 +103,7 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
                 }
             }
             ChildKind::Leaf(leaf) => {
-                let found = leaf_occluder::<S, N>(simd, bvh, leaf, ray);
+                let found = leaf_occluder(simd, bvh, crate::trace::view::Still, leaf, ray);
                 let index = bvh.leaf_index(leaf);
                 observer.leaf(index, bvh.leaf_len(leaf));
                 if let Some(lane) = found {
@@ -269,9 +269,11 @@ mod tests {
         let [object, world] = [&object, &world]
             .map(|mesh| [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])]);
         let instances: Vec<_> = (0..30)
-            .map(|_| Instance {
-                object: 0,
-                transform: core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-1.0, 1.0))),
+            .map(|_| {
+                Instance::new(
+                    0,
+                    core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-1.0, 1.0))),
+                )
             })
             .collect();
         let primitives =

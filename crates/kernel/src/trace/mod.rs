@@ -3,7 +3,7 @@
 //! Read in this order; each step uses those before it:
 //!
 //! 1. [`crate::geometry::ray_setup`] checks a ray and prepares it, and proves that no box that matters is missed.
-//! 2. `step`: the node step and the leaf step that every traversal consists of; `stack`: children still to visit.
+//! 2. `view`: what a ray meets at an index, now or at its time. `step`: the node step and the leaf step that every traversal consists of; `stack`: children still to visit.
 //! 3. `query`: how occlusion and closest hits differ.
 //! 4. `single`: one ray after another, the shortest of the loops.
 //! 5. `ray_batch`: rays of a batch, with conditions and reports. `stream`: many rays in flight, one step of each in turn;
@@ -12,8 +12,7 @@
 //! 7. `instrumented`: one ray after another, in any order (`pick`), while an observer counts or logs (`observe`).
 //! 8. `visit`: all hits of a ray, front to back; `several`: the nearest hits of many rays, in a stream; `conditional`:
 //!    occlusion under a `condition`.
-//! 9. `moving`: queries of trees that move, at the time of each ray.
-//! 10. `binary`: all nodes and hits of a ray in a binary tree.
+//! 9. `binary`: all nodes and hits of a ray in a binary tree.
 //!
 //! Points have queries of their own: `nearest`, what is near one, and `inside`, what is around one.
 //!
@@ -37,7 +36,6 @@ pub(crate) mod instrumented;
 mod leaf_places;
 pub(crate) mod locate;
 pub(crate) mod memory;
-pub(crate) mod moving;
 pub(crate) mod nearest;
 pub(crate) mod observe;
 pub(crate) mod packet;
@@ -51,4 +49,5 @@ pub(crate) mod stack;
 pub(crate) mod step;
 pub(crate) mod stream;
 pub(crate) mod surface;
+pub(crate) mod view;
 pub(crate) mod visit;

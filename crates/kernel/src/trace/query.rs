@@ -1,6 +1,6 @@
 //! The two queries, occlusion and closest hit: the decisions in which their traversals differ.
 
-use antumbra_simd::{Scalar, Simd, Width};
+use antumbra_simd::{Scalar, Simd};
 
 use crate::geometry::best::Best;
 use crate::geometry::cutout::opacity::QueryKind;
@@ -15,11 +15,9 @@ use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
 use crate::trace::conditional::{improve_when, occluder_when};
 use crate::trace::pick::Children;
-use crate::trace::ray_batch::RayBatch;
 use crate::trace::stack::Stack;
-use crate::trace::step::{
-    NodeLanes, NodeMask, NodeTest, leaf_intersect, leaf_occluder, scalar_occluder,
-};
+use crate::trace::step::{leaf_intersect, leaf_occluder, scalar_occluder};
+use crate::trace::view::View;
 use crate::tree::leaves::on_leaf;
 use crate::tree::node::Leaf;
 use crate::tree::wide::WideTree;
@@ -42,12 +40,6 @@ pub(crate) trait Query {
         Self::IDLE
     }
 
-    /// State with which a ray of a batch begins.
-    #[inline(always)]
-    fn begin_in(batch: &RayBatch<'_>, index: usize) -> Self::State {
-        Self::begin(&batch.rays[index])
-    }
-
     /// Answer of a ray that is at its end.
     fn finish(state: &Self::State) -> Self::Answer;
 
@@ -63,32 +55,13 @@ pub(crate) trait Query {
         ray.tfar
     }
 
-    /// Tests the boxes of a node.
-    #[inline(always)]
-    fn step<S: Simd + Width<N>, const N: usize>(
-        _: &Self::State,
-        simd: S,
-        bvh: &WideTree<N>,
-        index: usize,
-        test: &NodeTest<S, N>,
-        limit: f32,
-    ) -> (NodeMask<S, N>, NodeLanes<S, N>) {
-        test.step(simd, &bvh.nodes[index].planes, limit)
-    }
-
-    /// Prefetches a node.
-    #[inline(always)]
-    fn prefetch<S: Simd, const N: usize>(simd: S, bvh: &WideTree<N>, index: usize) {
-        // No check: nothing is read.
-        simd.prefetch_at(bvh.nodes.as_ptr().wrapping_add(index));
-    }
-
     /// Tests a leaf that the ray has reached, and brings its state and stack up to date.
-    fn leaf<S: Simd, const N: usize>(
+    fn leaf<S: Simd, V: View, const N: usize>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
         simd: S,
         bvh: &WideTree<N>,
+        view: V,
         leaf: Leaf,
         ray: &RaySetup,
     );
@@ -97,19 +70,6 @@ pub(crate) trait Query {
     #[inline(always)]
     fn enters(_: &Self::State, _: u32) -> bool {
         true
-    }
-
-    /// Makes `object` the ray in the object of instance `index`, unless the ray misses its box.
-    #[inline(always)]
-    fn place<S: Simd, const N: usize>(
-        _: &Self::State,
-        simd: S,
-        bvh: &WideTree<N>,
-        index: usize,
-        world: &RaySetup,
-        object: &mut RaySetup,
-    ) -> Option<Interval> {
-        bvh.instances[index].placement.enter(simd, world, object)
     }
 
     /// The ray goes into instance `index`.
@@ -129,11 +89,12 @@ pub(crate) trait StreamQuery: Query {
     /// A leaf is reached in a ray stream. Has no branches that are hard to predict, even if it takes longer from end to end:
     /// other rays fill the gaps, but a wrong guess throws their work away too. Returns the lanes, as bits, that are left to
     /// be [confirmed](StreamQuery::confirm); if each hit is to be decided about (`decides`), these are all that may be hit.
-    fn leaf_in_stream<S: Simd, const N: usize>(
+    fn leaf_in_stream<S: Simd, V: View, const N: usize>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
         simd: S,
         bvh: &WideTree<N>,
+        view: V,
         leaf: Leaf,
         ray: &RaySetup,
         decides: bool,
@@ -141,11 +102,12 @@ pub(crate) trait StreamQuery: Query {
 
     /// Decides about the lanes of a leaf that were left. Whether the ray goes on with a better hit.
     #[inline(always)]
-    fn confirm<S: Simd, const N: usize>(
+    fn confirm<S: Simd, V: View, const N: usize>(
         _: &mut Self::State,
         _: &mut Stack<'_, Self::Item>,
         _: S,
         _: &WideTree<N>,
+        _: V,
         _: (Leaf, u32),
         _: &RaySetup,
     ) -> bool {
@@ -157,7 +119,7 @@ pub(crate) trait StreamQuery: Query {
     fn confirm_when<const N: usize>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
-        bvh: &WideTree<N>,
+        bvh: (&WideTree<N>, impl View),
         lanes: (Leaf, u32),
         ray: (&RaySetup, Interval),
         condition: &Condition<'_>,
@@ -202,16 +164,17 @@ fn other_lanes<const N: usize>(bvh: &WideTree<N>, leaf: Leaf, ray: &RaySetup, li
 
 /// The lanes of a leaf in a ray stream that may be hit no farther than `limit`, as bits.
 #[inline(always)]
-pub(super) fn lanes_in_stream<S: Simd, const N: usize>(
+pub(super) fn lanes_in_stream<S: Simd, V: View, const N: usize>(
     simd: S,
     bvh: &WideTree<N>,
+    view: V,
     leaf: Leaf,
     ray: &RaySetup,
     limit: f32,
 ) -> u32 {
     match leaf.kind {
         PrimKind::Triangle => {
-            let block = &bvh.blocks.triangles[leaf.index];
+            let block = view.triangles(simd, bvh, leaf.index);
             block.candidates::<S, true>(simd, ray, limit).0
         }
         PrimKind::Curve => {
@@ -265,15 +228,16 @@ impl Query for Occlusion {
     }
 
     #[inline(always)]
-    fn leaf<S: Simd, const N: usize>(
+    fn leaf<S: Simd, V: View, const N: usize>(
         occluded: &mut bool,
         stack: &mut Stack<'_, u32>,
         simd: S,
         bvh: &WideTree<N>,
+        view: V,
         leaf: Leaf,
         ray: &RaySetup,
     ) {
-        *occluded = leaf_occluder::<S, N>(simd, bvh, leaf, ray).is_some();
+        *occluded = leaf_occluder(simd, bvh, view, leaf, ray).is_some();
         stack.clear_if(*occluded);
     }
 }
@@ -282,17 +246,20 @@ impl StreamQuery for Occlusion {
     const CONFIRMS: bool = false;
 
     #[inline(always)]
-    fn leaf_in_stream<S: Simd, const N: usize>(
+    fn leaf_in_stream<S: Simd, V: View, const N: usize>(
         occluded: &mut bool,
         stack: &mut Stack<'_, u32>,
         simd: S,
         bvh: &WideTree<N>,
+        view: V,
         leaf: Leaf,
         ray: &RaySetup,
         decides: bool,
     ) -> u32 {
         let lanes = match leaf.kind {
-            PrimKind::Triangle => bvh.blocks.triangles[leaf.index].occluders::<S, true>(simd, ray),
+            PrimKind::Triangle => view
+                .triangles(simd, bvh, leaf.index)
+                .occluders::<S, true>(simd, ray),
             PrimKind::Curve => {
                 let block = &bvh.blocks.curves[leaf.index];
                 match decides {
@@ -311,7 +278,7 @@ impl StreamQuery for Occlusion {
     fn confirm_when<const N: usize>(
         occluded: &mut bool,
         stack: &mut Stack<'_, u32>,
-        bvh: &WideTree<N>,
+        bvh: (&WideTree<N>, impl View),
         lanes: (Leaf, u32),
         (ray, interval): (&RaySetup, Interval),
         condition: &Condition<'_>,
@@ -400,15 +367,16 @@ impl Query for Closest {
     /// Children entered at the distance of the best hit are kept: they may hold an equally near primitive of
     /// a smaller id.
     #[inline(always)]
-    fn leaf<S: Simd, const N: usize>(
+    fn leaf<S: Simd, V: View, const N: usize>(
         best: &mut Best,
         stack: &mut Stack<'_, u64>,
         simd: S,
         bvh: &WideTree<N>,
+        view: V,
         leaf: Leaf,
         ray: &RaySetup,
     ) {
-        if leaf_intersect(simd, bvh, leaf, ray, best) {
+        if leaf_intersect(simd, bvh, view, leaf, ray, best) {
             Self::cull(best, stack, simd);
         }
     }
@@ -430,32 +398,36 @@ impl StreamQuery for Closest {
     /// Many leaves of triangles hold no candidate, and no CPU can guess which. So the others are left for
     /// later, when nearly all have one candidate and improve the best hit.
     #[inline(always)]
-    fn leaf_in_stream<S: Simd, const N: usize>(
+    fn leaf_in_stream<S: Simd, V: View, const N: usize>(
         best: &mut Best,
         _: &mut Stack<'_, u64>,
         simd: S,
         bvh: &WideTree<N>,
+        view: V,
         leaf: Leaf,
         ray: &RaySetup,
         _: bool,
     ) -> u32 {
-        lanes_in_stream(simd, bvh, leaf, ray, best.limit)
+        lanes_in_stream(simd, bvh, view, leaf, ray, best.limit)
     }
 
     #[inline(always)]
-    fn confirm<S: Simd, const N: usize>(
+    fn confirm<S: Simd, V: View, const N: usize>(
         best: &mut Best,
         stack: &mut Stack<'_, u64>,
         simd: S,
         bvh: &WideTree<N>,
+        view: V,
         (leaf, lanes): (Leaf, u32),
         ray: &RaySetup,
     ) -> bool {
-        let blocks = &bvh.blocks.triangles;
         let improved = match leaf.kind {
-            PrimKind::Triangle => {
-                blocks[leaf.index].improve(LanesOf(lanes), ray, &bvh.filters, best)
-            }
+            PrimKind::Triangle => view.triangles(simd, bvh, leaf.index).improve(
+                LanesOf(lanes),
+                ray,
+                &bvh.filters,
+                best,
+            ),
             _ => improve_other(bvh, (leaf, lanes), ray, best),
         };
         if improved {
@@ -467,7 +439,7 @@ impl StreamQuery for Closest {
     fn confirm_when<const N: usize>(
         best: &mut Best,
         stack: &mut Stack<'_, u64>,
-        bvh: &WideTree<N>,
+        bvh: (&WideTree<N>, impl View),
         lanes: (Leaf, u32),
         (ray, _): (&RaySetup, Interval),
         condition: &Condition<'_>,

@@ -21,8 +21,8 @@ pub(crate) struct RayBatch<'a> {
     after: Option<&'a [Hit]>,
     report: Report<'a>,
     is_alike: bool,
-    /// Per ray, its share of the way between two keys. Empty where nothing moves.
-    shares: &'a [f32],
+    /// Per ray, its share of the span at which it looks at a tree that moves.
+    shares: Option<&'a [f32]>,
 }
 
 /// Places of the rays in their batch.
@@ -71,7 +71,7 @@ impl<'a> RayBatch<'a> {
             after: None,
             report: Report::Nothing,
             is_alike: false,
-            shares: &[],
+            shares: None,
         }
     }
 
@@ -101,16 +101,18 @@ impl<'a> RayBatch<'a> {
         Self { is_alike, ..self }
     }
 
-    /// Each ray at its share of the way between two keys.
-    pub fn at(self, shares: &'a [f32]) -> Self {
-        debug_assert_eq!(shares.len(), self.rays.len());
+    /// Each ray looks at its own share of the span of a tree that moves.
+    pub fn at(self, shares: Option<&'a [f32]>) -> Self {
         Self { shares, ..self }
     }
 
-    /// Share of a ray of the way between two keys.
-    #[inline(always)]
-    pub fn share(&self, index: usize) -> f32 {
-        self.shares[index]
+    pub fn shares(&self) -> Option<&'a [f32]> {
+        self.shares
+    }
+
+    /// The share at which a ray looks.
+    pub fn share(&self, index: usize) -> Option<f32> {
+        self.shares.map(|shares| shares[index])
     }
 
     pub fn reporting(self, report: Report<'a>) -> Self {
@@ -125,6 +127,7 @@ impl<'a> RayBatch<'a> {
                 Places::Keys(first, keys) => Places::Keys(first, &keys[range.clone()]),
             },
             start: self.start + range.start,
+            shares: self.shares.map(|shares| &shares[range.clone()]),
             rays: &self.rays[range],
             ..*self
         }

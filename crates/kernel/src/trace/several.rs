@@ -15,7 +15,7 @@ use crate::trace::condition::Condition;
 use crate::trace::conditional::named;
 use crate::trace::query::{Closest, Query, StreamQuery, lanes_in_stream};
 use crate::trace::stack::Stack;
-use crate::tree::leaves::on_leaf;
+use crate::trace::view::{View, on_seen_leaf};
 use crate::tree::node::Leaf;
 use crate::tree::wide::WideTree;
 
@@ -117,19 +117,25 @@ impl Query for Nearest {
         Closest::limit(&found.last, ray)
     }
 
-    fn leaf<S: Simd, const N: usize>(
+    fn leaf<S: Simd, V: View, const N: usize>(
         found: &mut Found,
         stack: &mut Stack<'_, u32>,
-        _: S,
+        simd: S,
         bvh: &WideTree<N>,
+        view: V,
         leaf: Leaf,
         ray: &RaySetup,
     ) {
-        let lanes = on_leaf!(bvh, leaf, block => {
-            block.candidates::<Scalar, false>(Scalar, ray, found.last.limit)
-        });
+        let lanes = lanes_in_stream(simd, bvh, view, leaf, ray, found.last.limit);
         let ray = (ray, Interval::WORLD);
-        Self::confirm_when(found, stack, bvh, (leaf, lanes.0), ray, &Condition::NONE);
+        Self::confirm_when(
+            found,
+            stack,
+            (bvh, view),
+            (leaf, lanes),
+            ray,
+            &Condition::NONE,
+        );
     }
 
     #[inline(always)]
@@ -152,31 +158,33 @@ impl StreamQuery for Nearest {
     const CONFIRMS: bool = true;
 
     #[inline(always)]
-    fn leaf_in_stream<S: Simd, const N: usize>(
+    fn leaf_in_stream<S: Simd, V: View, const N: usize>(
         found: &mut Found,
         _: &mut Stack<'_, u32>,
         simd: S,
         bvh: &WideTree<N>,
+        view: V,
         leaf: Leaf,
         ray: &RaySetup,
         _: bool,
     ) -> u32 {
-        lanes_in_stream(simd, bvh, leaf, ray, found.last.limit)
+        lanes_in_stream(simd, bvh, view, leaf, ray, found.last.limit)
     }
 
     #[inline(always)]
-    fn confirm<S: Simd, const N: usize>(
+    fn confirm<S: Simd, V: View, const N: usize>(
         found: &mut Found,
         stack: &mut Stack<'_, u32>,
         _: S,
         bvh: &WideTree<N>,
+        view: V,
         lanes: (Leaf, u32),
         ray: &RaySetup,
     ) -> bool {
         Self::confirm_when(
             found,
             stack,
-            bvh,
+            (bvh, view),
             lanes,
             (ray, Interval::WORLD),
             &Condition::NONE,
@@ -187,12 +195,12 @@ impl StreamQuery for Nearest {
     fn confirm_when<const N: usize>(
         found: &mut Found,
         _: &mut Stack<'_, u32>,
-        bvh: &WideTree<N>,
+        (bvh, view): (&WideTree<N>, impl View),
         (leaf, lanes): (Leaf, u32),
         (ray, _): (&RaySetup, Interval),
         condition: &Condition<'_>,
     ) -> (bool, Option<PrimId>) {
-        on_leaf!(bvh, leaf, block => for lane in LanesOf(lanes) {
+        on_seen_leaf!(Scalar, bvh, view, leaf, block => for lane in LanesOf(lanes) {
             if condition.may_count(named(block.id(lane), ray))
                 && let Some(hit) = block.hit(lane, ray, &bvh.filters, QueryKind::Intersect)
             {

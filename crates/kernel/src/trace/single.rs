@@ -9,19 +9,21 @@ use crate::trace::pick::Children;
 use crate::trace::query::Query;
 use crate::trace::stack::{Item, Stack};
 use crate::trace::step::NodeTest;
+use crate::trace::view::{View, Views};
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::WideTree;
 
 /// Answers `rays` one by one; `answers` is as long.
-pub(crate) struct Single<'a, Q: Query, const N: usize> {
+pub(crate) struct Single<'a, Q: Query, V, const N: usize> {
     pub bvh: &'a WideTree<'a, N>,
+    pub views: V,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [Q::Item],
     pub rays: &'a [Ray],
     pub answers: &'a mut [Q::Answer],
 }
 
-impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
+impl<Q: Query, V: Views, const N: usize> WithSimd<N> for Single<'_, Q, V, N> {
     type Output = ();
 
     #[inline(always)]
@@ -29,12 +31,13 @@ impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
         let mut setup = RaySetup::IDLE;
         // Made when an instance is entered: most calls are of one ray that enters none.
         let mut object_setup = None;
-        for (ray, answer) in self.rays.iter().zip(self.answers) {
+        for (index, (ray, answer)) in self.rays.iter().zip(self.answers).enumerate() {
             // Made in place: a copy would wait for the narrow stores it was made by.
             *answer = if setup.set(simd, ray, self.bvh.reach) {
                 let stack = Stack::new(self.stack, 0);
                 let setups = (&setup, &mut object_setup);
-                traverse::<S, N, Q>(simd, self.bvh, setups, stack, Q::begin(ray))
+                let view = self.views.of(index);
+                traverse::<S, N, Q, _>(simd, self.bvh, view, setups, stack, Q::begin(ray))
             } else {
                 Q::miss()
             };
@@ -45,9 +48,10 @@ impl<Q: Query, const N: usize> WithSimd<N> for Single<'_, Q, N> {
 /// Visits the nodes and leaves that the query wants, until it is done or nothing is left. The ray is given as
 /// made ready for the world, and memory for it as made ready for the object of an instance.
 #[inline(always)]
-pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
+pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query, V: View>(
     simd: S,
     bvh: &WideTree<N>,
+    view: V,
     (world, object): (&RaySetup, &mut Option<RaySetup>),
     mut stack: Stack<'_, Q::Item>,
     mut state: Q::State,
@@ -63,7 +67,7 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
                     let limit = Q::limit(&state, ray);
                     // Computed again for every node: kept, its vectors would be spilled around every leaf.
                     let test = NodeTest::<S, N>::new(simd, fresh(ray));
-                    let (mask, entry) = Q::step(&state, simd, bvh, index, &test, limit);
+                    let (mask, entry) = view.step(simd, bvh, index, &test, limit);
                     let next = Q::Item::push_pop(&mut stack, node, mask, entry);
                     // What comes after it is likely to be visited too: 5 % on sponza.
                     if let Some(item) = stack.peek() {
@@ -72,7 +76,7 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
                     next
                 }
                 ChildKind::Leaf(leaf) => {
-                    Q::leaf(&mut state, &mut stack, simd, bvh, leaf, ray);
+                    Q::leaf(&mut state, &mut stack, simd, bvh, view, leaf, ray);
                     stack.pop().child()
                 }
                 ChildKind::Instance(_) if next == Child::DONE => return Q::finish(&state),
@@ -89,7 +93,7 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query>(
         let placed = &bvh.instances[passage];
         let object = object.get_or_insert(RaySetup::IDLE);
         let entered = match Q::enters(&state, placed.placement.inst_id) {
-            true => Q::place(&state, simd, bvh, passage, world, object),
+            true => view.place(simd, bvh, passage, world, object),
             false => None,
         };
         next = match entered {

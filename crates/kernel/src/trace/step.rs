@@ -7,6 +7,7 @@ use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::{RaySetup, Side};
 use crate::geometry::slab_test::NodeSlabs;
+use crate::trace::view::{View, on_seen_leaf};
 use crate::tree::leaves::on_leaf;
 use crate::tree::node::Leaf;
 use crate::tree::wide::WideTree;
@@ -43,21 +44,22 @@ impl<S: Simd + Width<N>, const N: usize> NodeTest<S, N> {
         planes: &[[[f32; N]; 2]; 3],
         tfar: f32,
     ) -> (NodeMask<S, N>, NodeLanes<S, N>) {
-        let [x, y, z] = [
-            self.near[0] as usize,
-            self.near[1] as usize,
-            self.near[2] as usize,
-        ];
-        let near = [
-            NodeLanes::<S, N>::load(simd, &planes[0][x]),
-            NodeLanes::<S, N>::load(simd, &planes[1][y]),
-            NodeLanes::<S, N>::load(simd, &planes[2][z]),
-        ];
-        let far = [
-            NodeLanes::<S, N>::load(simd, &planes[0][x ^ 1]),
-            NodeLanes::<S, N>::load(simd, &planes[1][y ^ 1]),
-            NodeLanes::<S, N>::load(simd, &planes[2][z ^ 1]),
-        ];
+        self.step_at(simd, tfar, |axis, side| {
+            NodeLanes::<S, N>::load(simd, &planes[axis][side])
+        })
+    }
+
+    /// [`NodeTest::step`] for boxes of which `at` gives the planes, by axis and side.
+    #[inline(always)]
+    pub fn step_at(
+        &self,
+        simd: S,
+        tfar: f32,
+        at: impl Fn(usize, usize) -> NodeLanes<S, N>,
+    ) -> (NodeMask<S, N>, NodeLanes<S, N>) {
+        let [x, y, z] = [self.near[0], self.near[1], self.near[2]].map(|side| side as usize);
+        let near = [at(0, x), at(1, y), at(2, z)];
+        let far = [at(0, x ^ 1), at(1, y ^ 1), at(2, z ^ 1)];
         let tfar = NodeLanes::<S, N>::splat(simd, tfar);
         self.slabs.test::<N>(near, far, tfar)
     }
@@ -65,15 +67,19 @@ impl<S: Simd + Width<N>, const N: usize> NodeTest<S, N> {
 
 /// Tests the primitives of a leaf: the first lane found that occludes the ray.
 #[inline(always)]
-pub(crate) fn leaf_occluder<S: Simd, const N: usize>(
+pub(crate) fn leaf_occluder<S: Simd, V: View, const N: usize>(
     simd: S,
     bvh: &WideTree<N>,
+    view: V,
     leaf: Leaf,
     ray: &RaySetup,
 ) -> Option<usize> {
     let Leaf { kind, index } = leaf;
     match kind {
-        PrimKind::Triangle => bvh.blocks.triangles[index].occluded::<S>(simd, ray, &bvh.filters),
+        PrimKind::Triangle => {
+            view.triangles(simd, bvh, index)
+                .occluded::<S>(simd, ray, &bvh.filters)
+        }
         PrimKind::Cutout => bvh.blocks.cutouts[index].occluded::<S>(simd, ray, &bvh.filters),
         PrimKind::Curve => bvh.blocks.curves[index].occluded::<S>(simd, ray, &bvh.filters),
         _ => scalar_occluder(bvh, leaf, ray),
@@ -94,12 +100,13 @@ pub(crate) fn scalar_occluder<const N: usize>(
 
 /// Replaces `best` by the leaf's closest hit where that precedes it, and returns whether it did.
 #[inline(always)]
-pub(crate) fn leaf_intersect<S: Simd, const N: usize>(
+pub(crate) fn leaf_intersect<S: Simd, V: View, const N: usize>(
     simd: S,
     bvh: &WideTree<N>,
+    view: V,
     leaf: Leaf,
     ray: &RaySetup,
     best: &mut Best,
 ) -> bool {
-    on_leaf!(bvh, leaf, block => block.intersect(simd, ray, &bvh.filters, best))
+    on_seen_leaf!(simd, bvh, view, leaf, block => block.intersect(simd, ray, &bvh.filters, best))
 }

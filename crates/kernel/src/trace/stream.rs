@@ -42,6 +42,7 @@ use crate::trace::query::StreamQuery;
 use crate::trace::ray_batch::{LocatedHit, RayBatch};
 use crate::trace::stack::{Item, Stack, stack_size};
 use crate::trace::step::NodeTest;
+use crate::trace::view::{View, Views};
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::WideTree;
 
@@ -97,8 +98,9 @@ fn block<'a, const N: usize>(
 }
 
 /// Answers rays in a stream; `answers` is as long. A `CAREFUL` stream decides about every hit, or notes the leaves of hits.
-pub(crate) struct Stream<'a, Q: StreamQuery, const N: usize, const CAREFUL: bool> {
+pub(crate) struct Stream<'a, Q: StreamQuery, V, const N: usize, const CAREFUL: bool> {
     pub bvh: &'a WideTree<'a, N>,
+    pub views: V,
     /// Memory of [`items`] items.
     pub items: &'a mut [Q::Item],
     /// Memory of [`SETUPS`] rays. What is in it does not matter.
@@ -125,8 +127,8 @@ fn stride(size: usize) -> usize {
     16 * (size.div_ceil(16) | 1)
 }
 
-impl<Q: StreamQuery, const N: usize, const CAREFUL: bool> WithSimd<N>
-    for Stream<'_, Q, N, CAREFUL>
+impl<Q: StreamQuery, V: Views, const N: usize, const CAREFUL: bool> WithSimd<N>
+    for Stream<'_, Q, V, N, CAREFUL>
 {
     type Output = ();
 
@@ -137,9 +139,10 @@ impl<Q: StreamQuery, const N: usize, const CAREFUL: bool> WithSimd<N>
         let ([setups, worlds], _) = self.setups.as_chunks_mut::<SLOTS>() else {
             unreachable!("memory for two rays in each slot");
         };
-        let mut flight = Flight::<S, Q, N, CAREFUL> {
+        let mut flight = Flight::<S, Q, V, N, CAREFUL> {
             simd,
             bvh: self.bvh,
+            views: self.views,
             leaf_places: &LeafPlaces::new(self.bvh),
             prefetch: self.prefetch,
             batch: self.batch,
@@ -221,8 +224,8 @@ impl Space {
 ///
 /// No method: the compiler keeps nothing of a stream in registers whose reference goes to a function that is not inlined.
 #[inline(never)]
-fn confirm_when<Q: StreamQuery, const N: usize>(
-    bvh: &WideTree<N>,
+fn confirm_when<Q: StreamQuery, V: View, const N: usize>(
+    (bvh, view): (&WideTree<N>, V),
     (batch, index): (&RayBatch<'_>, usize),
     (child, lanes): (Child, u32),
     ray: (&RaySetup, Interval),
@@ -232,7 +235,7 @@ fn confirm_when<Q: StreamQuery, const N: usize>(
         return false;
     };
     let (improved, occluder) = batch.with_condition(index, |condition| {
-        Q::confirm_when(state, stack, bvh, (leaf, lanes), ray, condition)
+        Q::confirm_when(state, stack, (bvh, view), (leaf, lanes), ray, condition)
     });
     if let Some(occluder) = occluder {
         batch.report_occluder(index, occluder);
@@ -272,9 +275,10 @@ fn report_surface<Q: StreamQuery>(
 
 /// A stream on its way. The arrays are separate variables behind references, so that the compiler sees that a write to
 /// one of them does not change another.
-struct Flight<'a, S, Q: StreamQuery, const N: usize, const CAREFUL: bool> {
+struct Flight<'a, S, Q: StreamQuery, V, const N: usize, const CAREFUL: bool> {
     simd: S,
     bvh: &'a WideTree<'a, N>,
+    views: V,
     leaf_places: &'a LeafPlaces,
     prefetch: bool,
     batch: &'a RayBatch<'a>,
@@ -311,8 +315,8 @@ struct Flight<'a, S, Q: StreamQuery, const N: usize, const CAREFUL: bool> {
     live: Slots,
 }
 
-impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
-    Flight<'_, S, Q, N, CAREFUL>
+impl<S: Simd + Width<N>, Q: StreamQuery, V: Views, const N: usize, const CAREFUL: bool>
+    Flight<'_, S, Q, V, N, CAREFUL>
 {
     #[inline(always)]
     fn empty_stacks(&mut self) {
@@ -416,7 +420,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
                 let index = index as usize;
                 let ray = &self.batch.rays[index];
                 if self.setups[id].set(self.simd, ray, self.bvh.reach) {
-                    self.states[id] = Q::begin_in(self.batch, index);
+                    self.states[id] = Q::begin(ray);
                     if CAREFUL {
                         self.spaces[id] = Space::WORLD;
                     }
@@ -455,19 +459,26 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
         }
     }
 
+    /// How the ray of a slot sees the tree.
+    #[inline(always)]
+    fn view(&self, id: usize) -> V::View {
+        self.views.of(self.ray_indices[id])
+    }
+
     #[inline(always)]
     fn prefetch_node(&self, id: usize) {
-        Q::prefetch(self.simd, self.bvh, self.next[id] as usize);
+        V::View::prefetch(self.simd, self.bvh, self.next[id] as usize);
     }
 
     /// A node step: tests the children of node `index` and pushes those that are hit.
     #[inline(always)]
     fn visit_node(&mut self, id: usize, index: usize) {
+        let view = self.view(id);
         let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
         let (node, ray) = (&self.bvh.nodes[index], &self.setups[id]);
         let limit = Q::limit(&self.states[id], ray);
         let test = NodeTest::<S, N>::new(self.simd, ray);
-        let (mask, entry) = Q::step(&self.states[id], self.simd, self.bvh, index, &test, limit);
+        let (mask, entry) = view.step(self.simd, self.bvh, index, &test, limit);
         Q::Item::push(&mut stack, node, mask, entry);
         self.tops[id] = stack.top();
     }
@@ -494,13 +505,14 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
             let index = Child(self.next[id]).index();
             let placed = &self.bvh.instances[index];
             self.worlds[id] = self.setups[id];
+            let view = self.view(id);
             let (world, object) = (&self.worlds[id], &mut self.setups[id]);
             let inst_id = placed.placement.inst_id;
             let may_count = |condition: &Condition<'_>| condition.enters(inst_id);
             let enters =
                 !self.decides || (self.batch).with_condition(self.ray_indices[id], may_count);
             let entered = match enters {
-                true => Q::place(&self.states[id], self.simd, self.bvh, index, world, object),
+                true => view.place(self.simd, self.bvh, index, world, object),
                 false => None,
             };
             match entered {
@@ -531,10 +543,12 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
             let Some(leaf) = self.leaf(id) else {
                 continue;
             };
+            let (simd, view) = (self.simd, self.view(id));
+            let decides = CAREFUL && self.decides;
             let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
             let (state, ray) = (&mut self.states[id], &self.setups[id]);
-            let (simd, decides) = (self.simd, CAREFUL && self.decides);
-            let left = Q::leaf_in_stream(state, &mut stack, simd, self.bvh, leaf, ray, decides);
+            let left =
+                Q::leaf_in_stream(state, &mut stack, simd, self.bvh, view, leaf, ray, decides);
             self.tops[id] = stack.top();
             self.lanes[id] = left;
             undecided.0 |= u64::from(left != 0) << id;
@@ -549,10 +563,10 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
             let Some(leaf) = self.leaf(id) else {
                 continue;
             };
-            let at = (leaf, self.lanes[id]);
+            let (at, view) = ((leaf, self.lanes[id]), self.view(id));
             let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
             let (state, ray) = (&mut self.states[id], &self.setups[id]);
-            let improved = Q::confirm(state, &mut stack, self.simd, self.bvh, at, ray);
+            let improved = Q::confirm(state, &mut stack, self.simd, self.bvh, view, at, ray);
             self.tops[id] = stack.top();
             if CAREFUL && improved {
                 self.note_leaf(id);
@@ -567,7 +581,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
         let lanes = self.lanes[id];
         let block = match self.leaf(id) {
             Some(leaf) if !Q::CONFIRMS && leaf.kind == PrimKind::Triangle => {
-                &self.bvh.blocks.triangles[leaf.index]
+                self.view(id).triangles(self.simd, self.bvh, leaf.index)
             }
             _ => return self.confirm_when(id, lanes),
         };
@@ -577,7 +591,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
             if self.batch.may_count(index, occluder)
                 && (self.by_name || {
                     let ray = (&self.setups[id], self.spaces[id].interval);
-                    accepts((self.batch, index), (block, lane), ray, &self.bvh.filters)
+                    accepts((self.batch, index), (&block, lane), ray, &self.bvh.filters)
                 })
             {
                 let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
@@ -592,12 +606,12 @@ impl<S: Simd + Width<N>, Q: StreamQuery, const N: usize, const CAREFUL: bool>
     /// Decides which of these lanes of the leaf of a slot fulfil the condition of its ray.
     #[inline(always)]
     fn confirm_when(&mut self, id: usize, lanes: u32) {
-        let child = Child(self.next[id]);
+        let (child, view) = (Child(self.next[id]), self.view(id));
         let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
         let (state, index) = (&mut self.states[id], self.ray_indices[id]);
         let ray = (&self.setups[id], self.spaces[id].interval);
-        let improved = confirm_when::<Q, N>(
-            self.bvh,
+        let improved = confirm_when::<Q, _, N>(
+            (self.bvh, view),
             (self.batch, index),
             (child, lanes),
             ray,

@@ -9,12 +9,11 @@ use antumbra_simd::Scalar;
 use crate::geometry::PrimRef;
 use crate::geometry::instance::{Affine, cross, dot};
 use crate::geometry::leaf_block::{LeafBlock, Normal};
-use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
 use crate::math;
 use crate::ray::{Hit, Ray};
 use crate::trace::ray_batch::LocatedHit;
-use crate::tree::leaves::on_leaf;
+use crate::trace::view::{View, on_seen_leaf};
 use crate::tree::node::ChildKind;
 use crate::tree::wide::WideTree;
 
@@ -49,34 +48,46 @@ pub struct Surface {
 }
 
 /// The surface of a hit that was found.
-pub(crate) fn surface<const N: usize>(bvh: &WideTree<N>, ray: &Ray, found: &LocatedHit) -> Surface {
+pub(crate) fn surface<const N: usize>(
+    bvh: &WideTree<N>,
+    view: impl View,
+    ray: &Ray,
+    found: &LocatedHit,
+) -> Surface {
     let hit = found.hit.told();
     let (mut position, mut normal) = ([0, 1, 2].map(|axis| at(ray, hit.t, axis)), [0.0; 3]);
-    let placed = bvh.instances.get(found.instance as usize);
+    let instance = (found.instance != LocatedHit::WORLD).then_some(found.instance as usize);
+    let placed = instance.and_then(|index| view.placed(bvh, index));
     if let ChildKind::Leaf(leaf) = found.leaf.kind() {
         let mut object = RaySetup::IDLE;
-        let here = match placed {
+        let here = match instance {
             None => Some(ray),
             // Triangles look only at the hit.
-            Some(_) if [PrimKind::Triangle, PrimKind::Cutout].contains(&leaf.kind) => Some(ray),
+            Some(_) if leaf.kind.is_triangle() => Some(ray),
             // The ray in the object, where the primitive was hit.
-            Some(placed) => RaySetup::new(ray, bvh.reach).and_then(|world| {
-                let entered = placed.placement.enter(Scalar, &world, &mut object);
+            Some(index) => RaySetup::new(ray, bvh.reach).and_then(|world| {
+                let entered = view.place(Scalar, bvh, index, &world, &mut object);
                 entered.map(|_| &*object)
             }),
         };
-        let told =
-            here.and_then(|ray| on_leaf!(bvh, leaf, block => of_block(block, ray, &found.hit)));
+        let told = here.and_then(
+            |ray| on_seen_leaf!(Scalar, bvh, view, leaf, block => of_block(block, ray, &found.hit)),
+        );
         if let Some((corners, found_normal)) = told {
             if let Some(corners) = corners {
                 let corners = corners.map(|corner| corner.map(f64::from));
-                let corners = match placed.map(|placed| Affine::new(&placed.world_from_object)) {
-                    Some(affine) => corners.map(|corner| affine.point(corner)),
+                let corners = match &placed {
+                    Some((_, world_from_object)) => {
+                        let affine = Affine::new(world_from_object);
+                        corners.map(|corner| affine.point(corner))
+                    }
                     None => corners,
                 };
                 position = in_plane(position, &corners);
             }
-            let columns = placed.map(|placed| &placed.placement.object_from_world);
+            let columns = placed
+                .as_ref()
+                .map(|(placement, _)| &placement.object_from_world);
             normal = found_normal
                 .and_then(|normal| unit(&normal, columns))
                 .unwrap_or(normal);

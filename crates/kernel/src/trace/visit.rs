@@ -32,7 +32,7 @@ use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
 use crate::trace::stack::Item;
 use crate::trace::step::NodeTest;
-use crate::tree::leaves::on_leaf;
+use crate::trace::view::{View, on_seen_leaf};
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::WideTree;
 
@@ -65,12 +65,13 @@ pub enum Visit {
 }
 
 /// Visits the hits of `ray`. The output is the hit that was accepted.
-pub(crate) struct Visiting<'a, const N: usize> {
+pub(crate) struct Visiting<'a, V, const N: usize> {
     pub bvh: &'a WideTree<'a, N>,
+    pub view: V,
     pub ahead: &'a mut Ahead,
     pub ray: &'a Ray,
     /// Instances in which nothing fulfils it are left out. Hits are the business of `visit`.
-    pub condition: Option<&'a Condition<'a>>,
+    pub condition: &'a Condition<'a>,
     pub visit: &'a mut dyn FnMut(Hit) -> Visit,
 }
 
@@ -183,13 +184,14 @@ impl Ahead {
     }
 }
 
-impl<const N: usize> WithSimd<N> for Visiting<'_, N> {
+impl<V: View, const N: usize> WithSimd<N> for Visiting<'_, V, N> {
     type Output = Option<Hit>;
 
     #[inline(always)]
     fn with_simd<S: Simd + Width<N>>(self, simd: S) -> Option<Hit> {
         let Self {
             bvh,
+            view,
             ahead,
             ray,
             condition,
@@ -225,21 +227,19 @@ impl<const N: usize> WithSimd<N> for Visiting<'_, N> {
             let space = now.space;
             next = match now.item.child().kind() {
                 ChildKind::Inner(index) => {
-                    let child = expand::<S, N>(simd, bvh, ahead, index, space);
+                    let child = expand(simd, (bvh, view), ahead, index, space);
                     ahead.nearest_or(child)
                 }
                 ChildKind::Leaf(leaf) => {
-                    search::<S, N>(simd, bvh, ahead, leaf, space);
+                    search(simd, (bvh, view), ahead, leaf, space);
                     ahead.nearest()
                 }
                 ChildKind::Instance(index) => {
                     let placed = &bvh.instances[index];
-                    let place = &placed.placement;
-                    let is_left_out =
-                        condition.is_some_and(|condition| !condition.enters(place.inst_id));
-                    let entered = match is_left_out {
-                        true => None,
-                        false => place.enter(simd, &ahead.spaces[0].ray, &mut setup),
+                    let world = &ahead.spaces[0].ray;
+                    let entered = match condition.enters(placed.placement.inst_id) {
+                        true => view.place(simd, bvh, index, world, &mut setup),
+                        false => None,
                     };
                     match entered {
                         Some(interval) => {
@@ -271,7 +271,7 @@ fn at(distance: u32, child: Child) -> u64 {
 #[inline(always)]
 fn expand<S: Simd + Width<N>, const N: usize>(
     simd: S,
-    bvh: &WideTree<N>,
+    (bvh, view): (&WideTree<N>, impl View),
     ahead: &mut Ahead,
     index: usize,
     space: u32,
@@ -279,7 +279,7 @@ fn expand<S: Simd + Width<N>, const N: usize>(
     let Space { ray, interval } = &ahead.spaces[space as usize];
     let node = &bvh.nodes[index];
     let test = NodeTest::<S, N>::new(simd, ray);
-    let (mask, entry) = test.step(simd, &node.planes, ray.tfar);
+    let (mask, entry) = view.step(simd, bvh, index, &test, ray.tfar);
     let mut items = [0; N];
     let count = entry.compress_sorted(mask, &node.children, &mut items);
     let end = interval.leave.max(0.0).to_bits();
@@ -298,14 +298,14 @@ fn expand<S: Simd + Width<N>, const N: usize>(
 #[inline(always)]
 fn search<S: Simd, const N: usize>(
     simd: S,
-    bvh: &WideTree<N>,
+    (bvh, view): (&WideTree<N>, impl View),
     ahead: &mut Ahead,
     leaf: Leaf,
     space: u32,
 ) {
     let ray = ahead.spaces[space as usize].ray;
     let filters = &bvh.filters;
-    on_leaf!(bvh, leaf, block => {
+    on_seen_leaf!(simd, bvh, view, leaf, block => {
         for lane in block.candidates::<S, false>(simd, &ray, ray.tfar) {
             if let Some(hit) = block.hit(lane, &ray, filters, QueryKind::Intersect) {
                 ahead.found(space, hit);

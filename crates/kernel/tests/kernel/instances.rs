@@ -466,8 +466,8 @@ fn closed_objects_do_not_leak() {
     let mesh = mesh::icosphere(4);
     for _ in 0..40 {
         let placement = transform(&mut rng);
-        let instance = Instance::new(0, placement);
-        let primitives = Primitives::with_instances(&[], &[[geometry(&mesh)]], &[instance])
+        let instance = [Instance::new(0, placement)];
+        let primitives = Primitives::with_instances(&[], &[[geometry(&mesh)]], &instance)
             .expect("indices in range");
         if primitives.instances() == 0 {
             continue;

@@ -245,10 +245,10 @@ fn errors_leave_the_world_alone() {
     let recipe = Recipe::default().width(Width::W8);
     let object = build(&list, &recipe);
     let here = Instance::new(0, IDENTITY);
-    let mut world = World::new(&[&object], &[here]).expect("the object is there");
+    let mut world = World::new(&[&object], &[here.clone()]).expect("the object is there");
     let nowhere = Instance::new(1, here.transform);
     assert_eq!(
-        world.set_instances(&[here, nowhere]),
+        world.set_instances(&[here.clone(), nowhere]),
         Err(Error::ObjectOutOfRange {
             inst_id: 1,
             object: 1,
@@ -268,7 +268,7 @@ fn errors_leave_the_world_alone() {
             found: 4
         })
     );
-    assert_eq!(world.instances(), [here]);
+    assert_eq!(world.instances(), std::slice::from_ref(&here));
     let ray = Ray::new([0.1, 0.2, 0.0], [0.0, 0.0, 1.0]);
     let hit = world.bvh().intersect(&ray).expect("still there");
     assert_eq!((hit.t, hit.inst_id), (1.0, 0));

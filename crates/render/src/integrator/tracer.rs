@@ -3,16 +3,13 @@
 use std::time::{Duration, Instant};
 
 use antumbra::parts::{Cost, Steps};
-use antumbra::{Bvh, Hit, Isa, MovingBvh, Ray};
+use antumbra::{Bvh, Hit, Isa, Ray};
 use serde::{Deserialize, Serialize};
 
 use super::queries::Queries;
 use crate::surface::Times;
 use crate::training::TrainingSample;
 use crate::world::World;
-
-/// Rays that a moving tree answers at a time, on this thread.
-const CHUNK: usize = 1 << 14;
 
 /// Record to keep of the rays besides their answers.
 pub enum Observe<'b> {
@@ -71,7 +68,7 @@ pub struct Tracer<'b> {
     stop: Option<&'b dyn Fn() -> bool>,
     /// The tree that moves, if there is one, and the times that its rays can have. The moving tree answers. `bvh`, in which
     /// everything is half way, then only counts and learns.
-    moving: Option<(&'b MovingBvh, Times)>,
+    moving: Option<(&'b Bvh, Times)>,
     /// Time of each sample of the batch, from 0 to 1.
     sample_times: Vec<f32>,
     /// Times of the rays under way.
@@ -95,7 +92,7 @@ impl<'b> Tracer<'b> {
     }
 
     /// Queries are answered by a tree of this world that moves, if there is one.
-    pub fn moving(mut self, world: &World, moving: Option<&'b MovingBvh>) -> Self {
+    pub fn moving(mut self, world: &World, moving: Option<&'b Bvh>) -> Self {
         self.moving = moving.zip(world.shapes.times());
         self
     }
@@ -142,13 +139,11 @@ impl<'b> Tracer<'b> {
         if let Some((moving, of_world)) = self.moving {
             self.times.clear();
             (self.times).extend(samples.map(|sample| self.sample_times[sample as usize]));
-            let chunks = rays.chunks(CHUNK).zip(self.times.chunks(CHUNK));
-            for ((rays, times), hits) in chunks.zip(hits.chunks_mut(CHUNK)) {
-                moving.intersect_batch(rays, times, hits);
-                for (hit, time) in hits.iter_mut().zip(times) {
-                    if let Some(hit) = hit {
-                        hit.inst_id = of_world.join(hit.inst_id, *time);
-                    }
+            let batch = moving.batch(rays).at(&self.times);
+            batch.on_this_thread().intersect_into(hits);
+            for (hit, time) in hits.iter_mut().zip(&self.times) {
+                if let Some(hit) = hit {
+                    hit.inst_id = of_world.join(hit.inst_id, *time);
                 }
             }
         } else if let Observe::Each(queries) = &mut self.observe {
@@ -196,10 +191,8 @@ impl<'b> Tracer<'b> {
         if let Some((moving, _)) = self.moving {
             self.times.clear();
             (self.times).extend(samples.map(|sample| self.sample_times[sample as usize]));
-            let chunks = rays.chunks(CHUNK).zip(self.times.chunks(CHUNK));
-            for ((rays, times), occluded) in chunks.zip(occluded.chunks_mut(CHUNK)) {
-                moving.occluded_batch(rays, times, occluded);
-            }
+            let batch = moving.batch(rays).at(&self.times);
+            batch.on_this_thread().occluded_into(occluded);
         }
         self.counts.shadow_rays += rays.len() as u64;
         self.counts.occluded_rays += occluded.iter().filter(|&&o| o).count() as u64;

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use antumbra::{Bvh, MovingBvh};
+use antumbra::Bvh;
 
 use super::Task;
 use super::learn::Learned;
@@ -136,7 +136,7 @@ impl<'a> Job<'a> {
     ///
     /// # Errors
     /// [`Error::Moves`] if the scene moves and an observer answers the queries, which does not know their times.
-    pub fn moving(&self, bvh: &Bvh, is_observed: bool) -> Result<Option<MovingBvh>, Error> {
+    pub fn moving(&self, bvh: &Bvh, is_observed: bool) -> Result<Option<Bvh>, Error> {
         if is_observed && self.world.moves() {
             return Err(Error::Moves);
         }

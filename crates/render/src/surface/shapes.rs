@@ -3,13 +3,13 @@
 use std::borrow::Cow;
 use std::ops::Index;
 
-use antumbra::{Aabb, Hit, INVALID_ID, MovingInstance};
+use antumbra::{Aabb, Hit, INVALID_ID, Instance};
 use antumbra_scene::{Scene, Shape};
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 
 use super::curve::CurvePart;
 use super::triangle::gamma;
-use crate::world::moving_instance;
+use crate::world::of_instance;
 
 /// All shapes of a scene: first the shapes of the world, then the shapes of every object in turn.
 ///
@@ -191,14 +191,14 @@ impl Times {
 struct Motion {
     times: Times,
     /// Keys of each instance. `None` for instances that do not move.
-    instances: Vec<Option<MovingInstance>>,
+    instances: Vec<Option<Instance>>,
 }
 
 impl Motion {
     /// `None` if no instance moves.
     fn new(scene: &Scene) -> Option<Self> {
         let moving = |instance: &antumbra_scene::Instance| {
-            instance.end.is_some().then(|| moving_instance(instance))
+            instance.end.is_some().then(|| of_instance(instance))
         };
         let instances: Vec<_> = scene.instances.iter().map(moving).collect();
         (instances.iter().any(Option::is_some)).then(|| Self {
@@ -209,9 +209,9 @@ impl Motion {
 }
 
 /// The transform of a moving instance at a time, as the kernel has it.
-fn at(instance: &MovingInstance, time: f32) -> Affine3A {
+fn at(instance: &Instance, time: f32) -> Affine3A {
     // Keys were checked when the scene was lowered.
-    let rows = instance.transform_at(time).unwrap_or(instance.keys[0]);
+    let rows = instance.transform_at(time).unwrap_or(instance.transform);
     affine(&rows)
 }
 

@@ -3,7 +3,7 @@
 use std::f32::consts::{PI, TAU};
 use std::sync::Arc;
 
-use antumbra::{MovingInstance, Ray};
+use antumbra::{Instance, Ray};
 use antumbra_scene::{Film, Projection};
 use glam::{Affine3, Affine3A, Mat4, Vec3, Vec4};
 
@@ -34,7 +34,7 @@ pub struct Camera {
     lens: Option<Arc<Lens>>,
     medium: Option<u32>,
     /// Keys of the camera, if it moves: from its space to the world.
-    path: Option<MovingInstance>,
+    path: Option<Instance>,
     /// Times at which the shutter opens and closes.
     shutter: [f32; 2],
     /// Whether paths have a time, as something moves.
@@ -308,13 +308,13 @@ impl Camera {
 }
 
 /// Keys of a camera that moves.
-fn path(camera: &antumbra_scene::Camera) -> Result<Option<MovingInstance>, Error> {
+fn path(camera: &antumbra_scene::Camera) -> Result<Option<Instance>, Error> {
     let Some(end) = camera.end else {
         return Ok(None);
     };
     let matrices = [camera.world_from_camera, end];
     let keys = matrices.map(|matrix| rows(&Affine3::from_mat4(matrix)));
-    let path = MovingInstance::new(0, keys.to_vec());
+    let path = Instance::moving(0, keys);
     let is_sound = path.transform_at(0.5).is_ok() && camera.shutter.iter().all(|t| t.is_finite());
     // Both mirror or none does, and neither flattens space.
     if !is_sound || matrices.iter().any(|matrix| matrix.row(3) != Vec4::W) {

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use antumbra::{MovingGeometry, MovingInstance, MovingScene, Primitives, Sphere};
+use antumbra::{Primitives, Sphere};
 use antumbra_scene::{Geometry, Instance, Scene, Shape};
 use glam::Affine3;
 
@@ -18,7 +18,7 @@ pub struct Lowered<'s> {
     pub world: Vec<antumbra::Geometry<'s>>,
     /// Shapes of every object, in the space of the object.
     pub objects: Vec<Vec<antumbra::Geometry<'s>>>,
-    /// Placed objects, where they are at time 0.
+    /// Placed objects.
     pub instances: Vec<antumbra::Instance>,
 }
 
@@ -48,24 +48,6 @@ impl<'s> Lowered<'s> {
             instances: scene.instances.iter().map(of_instance).collect(),
         };
         (lowered, parts)
-    }
-
-    /// The geometry with the keys of `scene`, whose it is; `None` where no instance moves.
-    ///
-    /// # Errors
-    /// As [`MovingScene::new`].
-    pub(crate) fn moving(&self, scene: &Scene) -> Result<Option<MovingScene<'s>>, antumbra::Error> {
-        if !scene.instances.iter().any(|one| one.end.is_some()) {
-            return Ok(None);
-        }
-        let instances = scene.instances.iter().map(moving_instance).collect();
-        let world = self
-            .world
-            .iter()
-            .cloned()
-            .map(MovingGeometry::from)
-            .collect();
-        MovingScene::new(world, self.objects.clone(), instances).map(Some)
     }
 
     /// Primitives of the kernel, checked.
@@ -101,21 +83,12 @@ fn of_shape<'s>(
     (geometry, Vec::new())
 }
 
-/// An instance. The kernel refuses instances of missing objects.
-fn of_instance(instance: &Instance) -> antumbra::Instance {
-    antumbra::Instance::new(object(instance), rows(&instance.world_from_object))
-}
-
-/// Instance with its transforms: at time 0, and at time 1 if it moves.
-pub fn moving_instance(instance: &Instance) -> MovingInstance {
+/// Instance with its transforms: at time 0, and at time 1 if it moves. The kernel refuses instances of missing objects.
+pub fn of_instance(instance: &Instance) -> antumbra::Instance {
+    // Numbers beyond 32 bits are beyond the number of objects, too.
+    let object = u32::try_from(instance.object).unwrap_or(u32::MAX);
     let keys = [Some(instance.world_from_object), instance.end];
-    let keys = keys.iter().flatten().map(rows).collect();
-    MovingInstance::new(object(instance), keys)
-}
-
-/// Numbers beyond 32 bits are beyond the number of objects, too.
-fn object(instance: &Instance) -> u32 {
-    u32::try_from(instance.object).unwrap_or(u32::MAX)
+    antumbra::Instance::moving(object, keys.iter().flatten().map(rows))
 }
 
 /// Rows of an affine map.

@@ -15,9 +15,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use antumbra::recipe::{Builder, Collapse};
-use antumbra::{
-    Build, BuildMonitor, Bvh, Isa, Motion, MovingBvh, Primitives, Recipe, Stage, Width,
-};
+use antumbra::{Build, BuildMonitor, Bvh, Isa, Primitives, Recipe, Stage, Width};
 use antumbra_scene::Scene;
 
 use crate::Error;
@@ -30,7 +28,7 @@ use crate::texture::Textures;
 pub use camera::Camera;
 use check::{check, check_film};
 pub use geometry::Lowered;
-pub(crate) use geometry::{moving_instance, rows};
+pub(crate) use geometry::{of_instance, rows};
 
 /// A scene ready to be rendered: kernel geometry with a binary tree, lights, materials, camera.
 ///
@@ -59,7 +57,8 @@ pub struct Contents {
     pub(crate) integrator: antumbra_scene::Integrator,
     /// Where something moves, primitives half way.
     pub(crate) primitives: Arc<Primitives>,
-    motion: Option<Motion>,
+    /// The primitives that move, where something does.
+    moving: Option<Primitives>,
     builder: Builder,
     /// Binary trees by their builders, built on first use.
     stages: Mutex<Vec<(Builder, Arc<Stage>)>>,
@@ -102,24 +101,16 @@ impl World {
         check(scene)?;
         let mut textures = Textures::default();
         let (lowered, curve_parts) = Lowered::with(scene, &mut textures);
-        let moving = lowered.moving(scene).map_err(Error::Geometry)?;
-        let (primitives, bounds, motion) = match moving {
-            None => {
-                let primitives = lowered.primitives().map_err(Error::Geometry)?;
-                let bounds = primitives.bounds();
-                (primitives, bounds, None)
-            }
-            // Trees are built where things are half way.
-            Some(scene) => {
-                let primitives = scene.middle(0).map_err(Error::Geometry)?;
-                let motion = Motion::new(&scene).map_err(Error::Geometry)?;
-                let bounds = motion.bounds().union(&primitives.bounds());
-                (primitives, bounds, Some(motion))
-            }
+        let primitives = lowered.primitives().map_err(Error::Geometry)?;
+        let bounds = primitives.bounds();
+        // Trees are built where things are half way.
+        let (primitives, moving) = match primitives.moves() {
+            false => (primitives, None),
+            true => (primitives.middle(0), Some(primitives)),
         };
         let lights = Lights::new(scene, &bounds, &mut textures);
         let emitters = EmitterTree::new(&lowered.world, |shape| lights.emitter(shape).is_some())?;
-        let camera = Camera::new(&scene.camera, &scene.film)?.with_time(motion.is_some());
+        let camera = Camera::new(&scene.camera, &scene.film)?.with_time(moving.is_some());
         let materials = scene.materials.iter();
         let materials: Vec<Material> = materials
             .map(|material| Material::new(material, &mut textures))
@@ -142,7 +133,7 @@ impl World {
             sampler: scene.sampler,
             integrator: scene.integrator,
             primitives: Arc::new(primitives),
-            motion,
+            moving,
             builder,
             stages: Mutex::default(),
             triangles: scene.triangle_count(),
@@ -173,7 +164,7 @@ impl World {
         }
         Ok(Self {
             contents: Arc::clone(&self.contents),
-            camera: Camera::new(camera, film)?.with_time(self.motion.is_some()),
+            camera: Camera::new(camera, film)?.with_time(self.moving.is_some()),
             film: film.clone(),
         })
     }
@@ -189,17 +180,15 @@ impl World {
     ///
     /// # Errors
     /// [`Error::Geometry`].
-    pub(crate) fn moving(&self, bvh: &Bvh) -> Result<Option<MovingBvh>, Error> {
-        let Some(motion) = &self.motion else {
-            return Ok(None);
-        };
-        let moving = MovingBvh::from_trees(motion, vec![bvh.clone()]);
-        moving.map(Some).map_err(Error::Geometry)
+    pub(crate) fn moving(&self, bvh: &Bvh) -> Result<Option<Bvh>, Error> {
+        let moving = self.moving.as_ref();
+        let moving = moving.map(|primitives| Bvh::moving(primitives, vec![bvh.clone()]));
+        moving.transpose().map_err(Error::Geometry)
     }
 
     /// Whether the camera or an instance moves while the shutter is open.
     pub fn moves(&self) -> bool {
-        self.motion.is_some() || self.camera.moves()
+        self.moving.is_some() || self.camera.moves()
     }
 
     /// Geometry of the kernel, for trees of one's own. Instances that move are half way.

@@ -102,12 +102,12 @@ impl World {
     ///
     /// # Errors
     /// An index of an object out of range; more instances, nodes or leaves than can be numbered; objects of different
-    /// [widths](crate::Recipe::width).
+    /// [widths](crate::Recipe::width); [`Error::Moves`] for an instance that moves while rays are traced.
     pub fn new(objects: &[impl AsRef<Object>], instances: &[Instance]) -> Result<Self, Error> {
         Self::put_together(None, objects, instances)
     }
 
-    /// Tree of a scene in which nothing moves: geometries of the ground, objects as lists of geometries, and instances.
+    /// Tree of a scene: geometries of the ground, objects as lists of geometries, and instances.
     /// Without `rays` it is learned from surface rays, as by [`Bvh::learn`].
     ///
     /// Takes longer to build than a world of finished objects, and answers faster: training rays are followed from the top
@@ -167,7 +167,8 @@ impl World {
     /// ```
     ///
     /// # Errors
-    /// An index of an object out of range; more instances or nodes than can be numbered. All stays as it is then.
+    /// An index of an object out of range; more instances or nodes than can be numbered; an instance that moves while rays
+    /// are traced. All stays as it is then.
     pub fn set_instances(&mut self, instances: &[Instance]) -> Result<(), Error> {
         self.refit(&[], instances)
     }
@@ -287,6 +288,8 @@ impl World {
                 limit: MAX_INSTANCES,
             });
         }
+        let why = "an instance in a world of objects cannot move while rays are traced";
+        (instances.iter()).try_for_each(|instance| instance.stands_still(why))?;
         let named = instances.iter().map(|instance| instance.object);
         (0u32..)
             .zip(named)

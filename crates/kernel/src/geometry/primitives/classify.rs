@@ -94,5 +94,6 @@ fn separated(
         objects: Vec::new(),
         instances: Vec::new(),
         identity: Identity::default(),
+        motion: None,
     }
 }

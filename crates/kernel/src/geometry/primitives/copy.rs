@@ -99,21 +99,28 @@ impl Copied {
             }
         });
         if !all_sound.into_inner() {
-            self.drop_unsound_triangles();
+            self.drop_unsound_triangles(geometries);
         }
     }
 
-    fn drop_unsound_triangles(&mut self) {
+    /// Triangles that move stay if they are sound at some time.
+    fn drop_unsound_triangles(&mut self, geometries: &[Geometry<'_>]) {
+        let is_ever_sound = |id: PrimRef| match &geometries[id.geom_id as usize] {
+            Geometry::Triangles(mesh) => mesh.is_ever_sound(id.prim_id),
+            _ => false,
+        };
         let mut kept = 0;
         for index in 0..self.triangles.len() {
             let (triangle, id) = (self.triangles[index], self.triangle_refs[index]);
             match check_triangle(&triangle) {
-                Ok(()) => {
+                Err(reason) if reason != DropReason::CornersCoincide || !is_ever_sound(id) => {
+                    self.drop_primitive(id, reason);
+                }
+                _ => {
                     self.triangles[kept] = triangle;
                     self.triangle_refs[kept] = id;
                     kept += 1;
                 }
-                Err(reason) => self.drop_primitive(id, reason),
             }
         }
         self.triangles.truncate(kept);

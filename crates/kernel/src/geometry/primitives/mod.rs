@@ -6,6 +6,7 @@
 //! - `classify`: filters decide which triangles are opaque, clear or partly transparent
 //! - `place`: objects are placed in the world
 //!
+//! `still` has those that move, at a time.
 //! `dropped` lists what was left out on the way, and why. `kinds` is the list of kinds. It numbers the result, kind
 //! after kind, and tests single primitives.
 
@@ -18,6 +19,7 @@ pub(crate) mod dropped;
 pub(crate) mod identity;
 pub(crate) mod kinds;
 mod place;
+mod still;
 
 use alloc::sync::Arc;
 
@@ -25,6 +27,7 @@ use crate::aabb::Aabb;
 use crate::error::Error;
 use crate::geometry::cutout::Filters;
 use crate::geometry::instance::{Instance, PlacedObject};
+use crate::geometry::motion::{Motion, check_keys};
 use crate::geometry::{Geometry, PrimRef};
 use crate::parallel::{chunk_len, map};
 use classify::classified;
@@ -81,6 +84,8 @@ pub struct Primitives {
     pub(crate) objects: Vec<Primitives>,
     pub(crate) instances: Vec<PlacedObject>,
     pub(crate) identity: Identity,
+    /// What moves. Everything else here is then as it is at time 0.
+    pub(crate) motion: Option<Arc<Motion>>,
 }
 
 impl Primitives {
@@ -104,22 +109,34 @@ impl Primitives {
     ///
     /// # Errors
     /// As [`Primitives::new`], for every list of geometries; an index of an object out of range; more than
-    /// 2²⁹ - 2 instances.
+    /// 2²⁹ - 2 instances; where something moves, the first key that is of no use: [`Error::OtherKeys`],
+    /// [`Error::OtherVertices`], [`Error::KeyPosition`], [`Error::KeyTransform`], [`Error::KeysMirror`], [`Error::OutOfRange`],
+    /// [`Error::Moves`].
     pub fn with_instances<'a>(
         world: &[Geometry<'_>],
         objects: &[impl AsRef<[Geometry<'a>]>],
         instances: &[Instance],
     ) -> Result<Self, Error> {
         let asked_for = asked_for(instances, objects.len())?;
+        let spans = check_keys(world, instances)?;
         let mut opacities = Vec::new();
         let mut lists = vec![Copied::new(world, None, &mut opacities)?];
         for ((object, is_asked_for), index) in objects.iter().zip(asked_for).zip(0u32..) {
             let object: &[Geometry<'_>] = if is_asked_for { object.as_ref() } else { &[] };
+            let why = "geometry of an object cannot move, but its instances can";
+            object
+                .iter()
+                .try_for_each(|geometry| geometry.stands_still(why))?;
             lists.push(Copied::new(object, Some(index), &mut opacities)?);
         }
         let mut lists = classified(lists, opacities);
         let mut primitives = lists.next().unwrap_or_default();
         primitives.place(lists.collect(), instances);
+        if spans > 0 {
+            let motion = Motion::new(spans, world, &primitives.objects, instances)?;
+            primitives.place_at(|inst_id| motion.transform(inst_id, 0, 0.0));
+            primitives.motion = Some(Arc::new(motion));
+        }
         Ok(primitives)
     }
 
@@ -193,8 +210,8 @@ impl Primitives {
         self.transparent + of_objects.sum::<usize>()
     }
 
-    /// The smallest box around primitives and the boxes of instances; empty if there is nothing. The box of an
-    /// instance is a little larger than needed.
+    /// The smallest box around primitives and the boxes of instances, at all times; empty if there is nothing. The box of
+    /// an instance is a little larger than needed.
     pub fn bounds(&self) -> Aabb {
         let count = self.len() + self.instances.len();
         let chunk = chunk_len(count);
@@ -205,6 +222,7 @@ impl Primitives {
             })
         })
         .iter()
+        .chain(&self.motion.as_ref().map(|motion| motion.bounds()))
         .fold(Aabb::EMPTY, |all, bounds| all.union(bounds))
     }
 }

@@ -48,9 +48,11 @@ fn with_instances(rng: &mut Rng) -> Primitives {
     let [object, world] =
         [&object, &world].map(|mesh| [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])]);
     let instances: Vec<_> = (0..40)
-        .map(|_| Instance {
-            object: 0,
-            transform: core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-0.8, 0.8))),
+        .map(|_| {
+            Instance::new(
+                0,
+                core::array::from_fn(|_| core::array::from_fn(|_| rng.range(-0.8, 0.8))),
+            )
         })
         .collect();
     Primitives::with_instances(&world, &[object], &instances).expect("indices in range")

@@ -256,13 +256,13 @@ fn forged_worlds_do_no_harm() {
                 Err(_) => refused += 1,
                 Ok(mut world) => {
                     ask(world.bvh(), rays);
-                    let moved: Vec<_> = world.instances().iter().rev().copied().collect();
+                    let moved: Vec<_> = world.instances().iter().rev().cloned().collect();
                     let _ = world.set_instances(&moved);
                     ask(world.bvh(), rays);
                     let _ = world.refit(&[(0, &lists[0]), (1, &lists[1])], &scene.instances);
                     world.relearn(rays, &recipe);
                     ask(world.bvh(), rays);
-                    let many = scene.instances.iter().cycle().take(200).copied();
+                    let many = scene.instances.iter().cycle().take(200).cloned();
                     let _ = world.set_instances(&many.collect::<Vec<_>>());
                     ask(world.bvh(), rays);
                     taken += 1;

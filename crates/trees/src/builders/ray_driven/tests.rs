@@ -99,9 +99,9 @@ fn rays_between(rng: &mut Rng, count: usize) -> Vec<Ray> {
 fn one_by_one(mesh: &Mesh, placed: Option<Instance>) -> Vec<Brute> {
     let alone = mesh.indices.iter().map(|corners| {
         let geometry = [Geometry::triangles(&mesh.positions[..], vec![*corners])];
-        let primitives = match placed {
+        let primitives = match &placed {
             None => Primitives::new(&geometry),
-            Some(instance) => Primitives::with_instances(&[], &[geometry], &[instance]),
+            Some(instance) => Primitives::with_instances(&[], &[geometry], &[instance.clone()]),
         };
         Brute::new(&primitives.expect("indices in range"))
     });
@@ -144,7 +144,7 @@ fn evidence_is_that_of_brute_force() {
     let in_world = hits_of(&one_by_one(&world, None), &rays);
     let in_instances = instances
         .iter()
-        .flat_map(|instance| hits_of(&one_by_one(&object, Some(*instance)), &rays))
+        .flat_map(|instance| hits_of(&one_by_one(&object, Some(instance.clone())), &rays))
         .collect();
     // Sorted, for the trees do not matter, and in which order they are entered.
     for (evidence, mut expected) in [(&all.world, in_world), (&all.objects[0], in_instances)] {
