@@ -1,6 +1,7 @@
 //! `bench`: what it writes, with and without Embree. Nothing is said about speed here.
 
-use antumbra::recipe::{Builder, Collapse, Level};
+use antumbra::recipe::Level;
+use antumbra_trees::{BUILDERS, COLLAPSES};
 use serde_json::Value;
 
 use crate::support::{Place, fields, files};
@@ -111,7 +112,7 @@ fn a_row_for_every_query_kind_tree_api_and_number_of_threads() {
     let rows = rows(&document);
     check_fields(rows, &FIELDS);
     // Kinds, queries, numbers of threads, APIs, orders, widths, and all collapses.
-    assert_eq!(rows.len(), 3 * 2 * 2 * 2 * 3 * 2 * Collapse::ALL.len());
+    assert_eq!(rows.len(), 3 * 2 * 2 * 2 * 3 * 2 * COLLAPSES.len());
     for row in rows {
         assert_eq!(row["triangles"], TRIANGLES);
         assert_eq!(row["ray_count"], 300);
@@ -139,7 +140,7 @@ fn a_row_for_every_query_kind_tree_api_and_number_of_threads() {
 
     let builds = document["builds"].as_array().expect("builds");
     check_fields(builds, &BUILD_FIELDS);
-    assert_eq!(builds.len(), 2 * Builder::ALL.len());
+    assert_eq!(builds.len(), 2 * BUILDERS.len());
     for build in builds {
         assert!(build["seconds"].as_f64() >= build["best_seconds"].as_f64());
         assert!(build["bytes"].as_u64() > Some(1000), "{build}");
@@ -326,7 +327,7 @@ fn instances_and_holes_are_traced_as_such() {
             assert!(row["disagreements"].as_u64() <= Some(6), "{row}");
         }
     }
-    assert_eq!(builds.len(), Builder::ALL.len() + engines - 1);
+    assert_eq!(builds.len(), BUILDERS.len() + engines - 1);
     for build in builds {
         // Two levels, not the written-out triangles. The leaves of pbrt are small, so that blocks are half empty.
         assert!(build["bytes"].as_u64() < Some(500 * 2216), "{build}");

@@ -1,6 +1,7 @@
 //! `study`, row by row.
 
-use antumbra::recipe::{Builder, Collapse, Level, Order};
+use antumbra::recipe::{Level, Order};
+use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS};
 
 use crate::support::{Place, fields, files};
 
@@ -70,7 +71,7 @@ fn a_row_for_every_order_and_width() {
     }
     assert_eq!(document["complete"], true);
     let rows = document["rows"].as_array().expect("rows");
-    assert_eq!(rows.len(), 3 * Order::ALL.len());
+    assert_eq!(rows.len(), 3 * ORDERS.len());
     for row in rows {
         let (mut found, mut expected) = (fields(row), FIELDS.to_vec());
         found.sort_unstable();
@@ -399,18 +400,18 @@ fn every_combination_has_the_same_pictures_and_answers() {
             .filter(|row| row["by"] == by && row["part"] == part)
             .collect()
     };
-    let trees = Builder::ALL.len() * Collapse::ALL.len();
+    let trees = BUILDERS.len() * COLLAPSES.len();
     let rendered = of("render", "techniques");
     // All orders on one tree, all trees by one order, and those of the paper unsorted.
-    assert_eq!(rendered.len(), Order::ALL.len() + trees);
+    assert_eq!(rendered.len(), ORDERS.len() + trees);
     for row in &rendered {
         assert_eq!(row["image_hash"], rendered[0]["image_hash"]);
     }
     let replayed = of("replay", "techniques");
-    assert_eq!(replayed.len(), 2 * trees * Order::ALL.len());
+    assert_eq!(replayed.len(), 2 * trees * ORDERS.len());
     for kind in ["shadow", "ao"] {
         let own: Vec<_> = replayed.iter().filter(|row| row["rays"] == kind).collect();
-        assert_eq!(own.len(), trees * Order::ALL.len());
+        assert_eq!(own.len(), trees * ORDERS.len());
         for row in own {
             assert_eq!(row["equal_answers"], true, "{row}");
             assert_eq!(row["test_rays"], 600);

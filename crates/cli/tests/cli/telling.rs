@@ -1,7 +1,8 @@
 //! What the program tells about itself: `list`, `completions`, `man` and `--version`.
 
-use antumbra::recipe::{Builder, Collapse, Level, Order, Preset};
+use antumbra::recipe::{Level, Preset};
 use antumbra::{Isa, Width};
+use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS};
 
 use crate::support::{Place, fields, files};
 
@@ -11,9 +12,9 @@ fn lists() -> [(&'static str, Vec<String>); 6] {
         all.iter().map(ToString::to_string).collect()
     }
     [
-        ("orders", names(&Order::ALL)),
-        ("builders", names(&Builder::ALL)),
-        ("collapses", names(&Collapse::ALL)),
+        ("orders", names(&ORDERS)),
+        ("builders", names(&BUILDERS)),
+        ("collapses", names(&COLLAPSES)),
         ("levels", names(&Level::ALL)),
         ("presets", names(&Preset::ALL)),
         ("widths", names(&Width::ALL)),

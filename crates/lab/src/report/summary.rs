@@ -580,7 +580,7 @@ mod tests {
         let plan = plan(1);
         let [paper, default] = ends(WIDTH);
         let by_ray = Combination {
-            order: Order::Ftob,
+            order: antumbra_trees::FTOB,
             ..default
         };
         let mut figures = vec![

@@ -1,11 +1,12 @@
 //! Training rays and held-out rays, and trees of every combination.
 
 use crate::support::*;
-use antumbra::recipe::{Builder, Collapse, Order};
+use antumbra::recipe::Order;
 use antumbra::{Ray, Recipe, Width};
 use antumbra_lab::{Lot, RaysFrom, SampledRays, TrainedTree};
 use antumbra_render::{Options, render};
 use antumbra_testkit::sample::{pairs, triples};
+use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS};
 use glam::Vec3;
 
 const SPP: u32 = 3;
@@ -127,8 +128,8 @@ fn every_combination_answers_alike_and_predicts_a_cost() {
     let mut expected = vec![false; test.len()];
     bvh.occluded_batch(&test, &mut expected);
     let recipe = Recipe::default().seed(5);
-    let kinds = pairs(0, &Builder::ALL, &RaysFrom::ALL);
-    for ((builder, from), collapse, order) in triples(0, &kinds, &Collapse::ALL, &Order::ALL) {
+    let kinds = pairs(0, &BUILDERS, &RaysFrom::ALL);
+    for ((builder, from), collapse, order) in triples(0, &kinds, &COLLAPSES, &ORDERS) {
         let trained = TrainedTree::new(&world, &recipe.builder(builder), &log.shadow, from);
         assert_eq!(trained.builder(), builder);
         let mut collapsed = trained.collapse(&recipe.collapse(collapse).width(Width::W8));
@@ -147,7 +148,7 @@ fn every_combination_answers_alike_and_predicts_a_cost() {
     // Without rays nothing is learned, and nothing fails.
     let trained = TrainedTree::new(&world, &recipe, &[], RaysFrom::Camera);
     let mut collapsed = trained.collapse(&recipe.width(Width::W4));
-    for order in Order::ALL {
+    for order in ORDERS {
         assert!(
             collapsed
                 .order(order)

@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 
 use crate::support::heap::{heap, options};
 use crate::support::*;
-use antumbra::recipe::{Builder, Collapse, Order};
+use antumbra::recipe::{Collapse, Order};
 use antumbra_render::{Options, Rendering};
 use antumbra_scene::SamplerKind;
 
@@ -156,19 +156,9 @@ fn any_share_may_be_learned_from() {
         };
         picture_with(&scene, &options).stats
     };
-    // Learned collapses keep a bounded sample of the rays, and so do builders that are driven by rays.
+    // Learned collapses keep a bounded sample of the rays.
     let learned = stats_of(Collapse::Learned, 1.0);
     assert_eq!(learned.logged_rays, learned.shadow_rays.min(1 << 12));
-    let driven = Options {
-        log_share: 1.0,
-        recipe: options()
-            .recipe
-            .builder(Builder::Srdh)
-            .collapse(Collapse::Area),
-        ..options()
-    };
-    let driven = picture_with(&scene, &driven).stats;
-    assert_eq!(driven.logged_rays, driven.shadow_rays.min(1 << 12));
     let nothing = stats_of(Collapse::Learned, 0.0);
     assert_eq!(nothing.logged_rays, 0);
     assert_eq!(nothing.predicted_cost_after, None);
