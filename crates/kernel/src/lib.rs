@@ -180,7 +180,7 @@ pub mod recipe {
 /// - [`Plan`](parts::Plan) puts the children of every node of a wide [`Tree`](parts::Tree) in order, for training rays in a
 ///   [`Log`](parts::Log).
 /// - [`Steps`](parts::Steps) has the steps of learning one by one, and queries that count what they do;
-///   [`observe`](parts::observe) tells an [`Observer`](parts::Observer) all of it.
+///   [`observe`](parts::observe) reports all of it to an [`Observer`](parts::Observer).
 ///
 /// ```
 /// use antumbra::parts::{Cost, Steps};

@@ -324,7 +324,7 @@ impl Stage {
     }
 }
 
-/// Occlusion of rays one by one, on the calling thread, while an observer is told what happens. Returns whether anything lies
+/// Occlusion of rays one by one, on the calling thread, while what happens is reported to an observer. Returns whether anything lies
 /// in the interval of each ray.
 pub fn observe(bvh: &Bvh, rays: &[Ray], observer: &mut dyn Observer) -> Vec<bool> {
     let mut occluded = vec![false; rays.len()];

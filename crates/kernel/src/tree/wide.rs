@@ -146,7 +146,7 @@ impl Tree {
         self.pick = order.pick;
     }
 
-    /// Number of nodes, those of objects included. Children follow their parents, also from an instance to the root of its
+    /// Number of nodes, with the nodes of objects. Children follow their parents, also from an instance to the root of its
     /// object.
     pub fn node_count(&self) -> usize {
         self.nodes.len()
