@@ -71,7 +71,7 @@ impl Batch<'_> {
     ) {
         for (span, bvh) in self.trees() {
             let open = Open::new(self, span, first..first + states.len());
-            self.visit_open(memory, bvh, first, open, states, visit, so_far);
+            self.visit_open(memory, bvh, open, states, visit, so_far);
         }
     }
 
@@ -80,7 +80,6 @@ impl Batch<'_> {
         &self,
         memory: &mut Memory,
         bvh: &Bvh,
-        first: usize,
         mut open: Open,
         states: &mut [T],
         visit: &impl Fn(&mut T, Hit) -> Visit,
@@ -88,7 +87,7 @@ impl Batch<'_> {
     ) {
         let len = open.rays.len();
         if !bvh.is_worth_a_stream(len) {
-            let batch = open.batch(first).under(self.conditions());
+            let batch = open.batch().under(self.conditions());
             for (index, ray) in open.rays.iter().enumerate() {
                 let (state, moment) = (
                     &mut states[open.keys[index].index()],
@@ -111,7 +110,7 @@ impl Batch<'_> {
             let cells = Cell::from_mut(&mut found[..]).as_slice_of_cells();
             let report =
                 |index: usize, _: &Ray, found: &LocatedHit| cells[index].set(Some(found.hit));
-            let batch = open.batch(first).under(self.conditions());
+            let batch = open.batch().under(self.conditions());
             let batch = batch.reporting(Report::Surface(&report));
             bvh.intersect_many(memory, &batch, &mut closest);
             open.retain(|index, place| found[index].filter(|hit| goes_on(place, hit)));
@@ -120,7 +119,7 @@ impl Batch<'_> {
         let pending: Vec<u32> = (0..lists.len() as u32).collect();
         while !open.rays.is_empty() {
             let len = open.rays.len();
-            let batch = open.batch(first).under(self.conditions());
+            let batch = open.batch().under(self.conditions());
             let batch = batch.behind(&open.after);
             bvh.stream_of::<Nearest, true>(memory, &batch, &pending[..len], &mut lists[..len]);
             open.retain(|index, place| {
@@ -135,6 +134,8 @@ impl Batch<'_> {
 
 /// Rays whose visit has not ended.
 struct Open {
+    /// The place of this part in the batch.
+    first: usize,
     rays: Vec<Ray>,
     /// Per ray, its place in this part of the batch.
     keys: Vec<Key>,
@@ -157,6 +158,7 @@ impl Open {
         let keys: Vec<Key> = own.map(|place| Key::at(place - first)).collect();
         let places = keys.iter().map(|key| first + key.index());
         Self {
+            first,
             rays: places.clone().map(|place| batch.ray(place)).collect(),
             shares: places.map(|place| batch.share(place)).collect(),
             after: vec![FIRST; keys.len()],
@@ -164,9 +166,9 @@ impl Open {
         }
     }
 
-    /// The rays as a part of a batch that begins at this place.
-    fn batch(&self, first: usize) -> RayBatch<'_> {
-        RayBatch::by_keys(&self.rays, first, &self.keys).at(self.shares.as_deref())
+    /// The rays as a part of the batch.
+    fn batch(&self) -> RayBatch<'_> {
+        RayBatch::by_keys(&self.rays, self.first, &self.keys).at(self.shares.as_deref())
     }
 
     /// Keeps the rays whose visit continues behind a hit. `goes_on` is called with index and place of each ray, and

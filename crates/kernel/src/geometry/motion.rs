@@ -302,7 +302,7 @@ impl Motion {
                 }
             };
             let placements = instances.iter().zip(0u32..).map(of_instance);
-            let of_mesh = |(keys, indices): &(Vec<Arc<[[f32; 3]]>>, Arc<[[u32; 3]]>)| MeshSpan {
+            let of_mesh = |(keys, indices): &MeshKeys| MeshSpan {
                 positions: [span, span + 1].map(|key| Arc::clone(&keys[key])),
                 indices: Arc::clone(indices),
             };
@@ -350,7 +350,9 @@ impl Motion {
 }
 
 /// All keys of a mesh that moves, and its indices.
-fn keys_of(geometry: &Geometry<'_>) -> Option<(Vec<Arc<[[f32; 3]]>>, Arc<[[u32; 3]]>)> {
+type MeshKeys = (Vec<Arc<[[f32; 3]]>>, Arc<[[u32; 3]]>);
+
+fn keys_of(geometry: &Geometry<'_>) -> Option<MeshKeys> {
     match geometry {
         Geometry::Triangles(mesh) if !mesh.moves_to.is_empty() => {
             let keys = core::iter::once(&mesh.positions).chain(&mesh.moves_to);

@@ -89,6 +89,10 @@ pub(crate) trait StreamQuery: Query {
     /// A leaf is reached in a ray stream. Has no branches that are hard to predict, even if it takes longer from end to end:
     /// other rays fill the gaps, but a wrong guess throws their work away too. Returns the lanes, as bits, that are left to
     /// be [confirmed](StreamQuery::confirm); if each hit is to be decided about (`decides`), these are all that may be hit.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "all of them are in registers where the call is inlined"
+    )]
     fn leaf_in_stream<S: Simd, V: View, const N: usize>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,

@@ -176,6 +176,10 @@ impl Views for Shares<'_> {
 }
 
 /// A block where it lies, or where it has moved to.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "it lies on the stack while a leaf is tested, and a box would need memory"
+)]
 enum Block<'a> {
     Here(&'a TriangleBlock),
     Moved(TriangleBlock),

@@ -245,7 +245,8 @@ fn errors_leave_the_world_alone() {
     let recipe = Recipe::default().width(Width::W8);
     let object = build(&list, &recipe);
     let here = Instance::new(0, IDENTITY);
-    let mut world = World::new(&[&object], &[here.clone()]).expect("the object is there");
+    let mut world =
+        World::new(&[&object], core::slice::from_ref(&here)).expect("the object is there");
     let nowhere = Instance::new(1, here.transform);
     assert_eq!(
         world.set_instances(&[here.clone(), nowhere]),

@@ -101,7 +101,9 @@ fn one_by_one(mesh: &Mesh, placed: Option<Instance>) -> Vec<Brute> {
         let geometry = [Geometry::triangles(&mesh.positions[..], vec![*corners])];
         let primitives = match &placed {
             None => Primitives::new(&geometry),
-            Some(instance) => Primitives::with_instances(&[], &[geometry], &[instance.clone()]),
+            Some(instance) => {
+                Primitives::with_instances(&[], &[geometry], core::slice::from_ref(instance))
+            }
         };
         Brute::new(&primitives.expect("indices in range"))
     });
