@@ -3,8 +3,8 @@
 //! Names of questions are words of the digest, and stay when what they call is renamed.
 
 use antumbra::{
-    Batch, Bvh, ClosestPoint, Column, Directions, Hit, PrimId, Ray, RayColumns, RayOrder, RayQuery,
-    Surface, Visit,
+    Batch, Bvh, ClosestPoint, Column, Directions, Hit, Isa, PrimId, Ray, RayColumns, RayOrder,
+    RayQuery, Surface, Visit,
 };
 use xxhash_rust::xxh3::Xxh3Default;
 
@@ -102,6 +102,8 @@ impl<'a> Questions<'a> {
 
     /// The two questions that matter most, of all rays so many times over: threads share batches that are long enough.
     pub fn briefly(&self, bvh: &Bvh, times: usize) -> Vec<Answer> {
+        let mut bvh = bvh.clone();
+        bvh.set_isa(Isa::best());
         let rays = self.rays.repeat(times);
         let (occluded, hits) = (bvh.batch(&rays).occluded(), bvh.batch(&rays).intersect());
         let mut answers = Vec::new();

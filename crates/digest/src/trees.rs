@@ -27,12 +27,19 @@ pub fn training(rays: &[Ray]) -> Vec<Ray> {
     rays.iter().copied().step_by(3).collect()
 }
 
+/// A recipe whose tree is the same on every machine: boxes are hit a little differently by levels that round products, and a
+/// log of rays says so.
+fn learned(recipe: Recipe, width: Width) -> Recipe {
+    let scalar = Isa::new(Level::Scalar).expect("every machine has it");
+    recipe.isa(scalar).width(width)
+}
+
 /// A tree of every preset and width, by recipe and width.
 pub fn by_presets(primitives: &Primitives, rays: &[Ray]) -> Vec<(&'static str, Width, Bvh)> {
     let mut trees = Vec::new();
     for preset in Preset::ALL {
         for width in Width::ALL {
-            let recipe = preset.recipe().width(width);
+            let recipe = learned(preset.recipe(), width);
             let bvh = Bvh::learn(primitives, rays, &recipe).expect(SOUND);
             trees.push((preset.name(), width, bvh));
         }
@@ -45,7 +52,7 @@ pub fn by_choices(primitives: &Primitives, rays: &[Ray]) -> Vec<(&'static str, S
     let mut trees = Vec::new();
     let fast = Recipe::fast().seed(7);
     for builder in BUILDERS {
-        let recipe = fast.builder(builder);
+        let recipe = learned(fast.builder(builder), Width::W8);
         let stage = Build::new(primitives)
             .recipe(&recipe)
             .rays(rays)
@@ -53,7 +60,8 @@ pub fn by_choices(primitives: &Primitives, rays: &[Ray]) -> Vec<(&'static str, S
             .expect(SOUND);
         for width in Width::ALL {
             let mut add = |list, name: &str, recipe: &Recipe| {
-                let bvh = stage.learn(rays, &recipe.width(width), &()).expect(SOUND);
+                let recipe = learned(*recipe, width);
+                let bvh = stage.learn(rays, &recipe, &()).expect(SOUND);
                 trees.push((list, format!("{name} w{width}"), bvh));
             };
             add("builder", builder.name(), &recipe);
@@ -73,7 +81,7 @@ pub fn by_choices(primitives: &Primitives, rays: &[Ray]) -> Vec<(&'static str, S
 
 /// A world of the same contents that can move, and one of its objects.
 fn world(scene: &Scene, width: Width) -> (World, Object) {
-    let recipe = Recipe::default().width(width);
+    let recipe = learned(Recipe::default(), width);
     let object = |geometries| Object::build(geometries, &recipe).expect(SOUND);
     let mut objects: Vec<_> = scene.objects.iter().map(object).collect();
     let world = World::on_ground(&object(&scene.world), &objects, &scene.instances);
@@ -103,7 +111,7 @@ pub fn masked(scene: &Scene, width: Width, mut bvh: Bvh) -> Vec<(&'static str, B
 
 /// What is saved after changes: other rays, and other vertices or instances.
 pub fn changed(scene: &Scene, width: Width, mut bvh: Bvh) -> Vec<(&'static str, Vec<u8>)> {
-    let recipe = Recipe::default().width(width);
+    let recipe = learned(Recipe::default(), width);
     let order = bvh.relearn(&scene.rays[..scene.rays.len() / 4], &recipe);
     let mut all = vec![("relearned", bvh.to_bytes())];
     let other = &scene.rays[scene.rays.len() / 2..];
@@ -134,11 +142,11 @@ pub fn changed(scene: &Scene, width: Width, mut bvh: Bvh) -> Vec<(&'static str, 
 pub fn moving(moving: &Moving, width: Width) -> ([(&'static str, Bvh); 2], Vec<Bvh>) {
     let primitives =
         Primitives::with_instances(&moving.world, &moving.objects, &moving.instances).expect(SOUND);
-    let recipe = Recipe::default().width(width);
+    let recipe = learned(Recipe::default(), width);
     let build = Build::new(&primitives).recipe(&recipe);
     let plain = build.bvh().expect(SOUND);
-    let learned = build.rays(&moving.rays).times(&moving.times);
-    let learned = learned.bvh().expect(SOUND);
+    let whole = build.rays(&moving.rays).times(&moving.times);
+    let learned = whole.bvh().expect(SOUND);
     let span = |span| {
         let primitives = primitives.middle(span);
         Bvh::learn(&primitives, &training(&moving.rays), &recipe).expect(SOUND)
@@ -159,7 +167,8 @@ pub fn counted(bvh: &Bvh, rays: &[Ray]) -> String {
         sums = std::array::from_fn(|i| sums[i] + u64::from(own[i]));
     }
     let [nodes, top, prims] = sums;
-    let predicted = bvh.report().predicted_cost.unwrap_or(f64::NAN);
+    let predicted = bvh.report().predicted_cost;
+    let predicted = predicted.map_or("nothing".to_owned(), |cost| cost.to_string());
     format!("nodes {nodes} top {top} primitives {prims} predicted {predicted}")
 }
 
