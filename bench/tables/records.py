@@ -8,7 +8,7 @@ import re
 
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
-PAPER = "crates/lab/src/report/paper.csv"
+PAPER = "science/lab/src/report/paper.csv"
 ORDERS = "simple random ftob sato embree rtsah sort- sort sort+ visits joint".split()
 PAPER_ORDERS = "simple ftob sato sort- sort sort+".split()
 PRIM = 0.15  # cost of a primitive test in node tests
