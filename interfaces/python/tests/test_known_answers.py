@@ -1,4 +1,4 @@
-"""Bits of answers against those of the kernel, by check sums: crates/kernel/tests/kernel/known_answers.rs has the same."""
+"""Bits of answers against those of the kernel, by check sums: kernel/antumbra/tests/kernel/known_answers.rs has the same."""
 
 import antumbra as am
 import numpy as np

@@ -1,4 +1,4 @@
-//! What the C interface costs over calls of the Rust library: `bench/capi/run`.
+//! What the C interface costs over calls of the Rust library: `interfaces/capi/bench/run`.
 //!
 //! Both sides ask the same tree in the same program about the same rays. Answers are compared bit for bit before anything is
 //! timed. CPU time of one thread, interleaved turns, medians of the turns, and the median of the ratios of neighbouring turns.

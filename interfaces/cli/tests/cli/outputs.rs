@@ -332,7 +332,7 @@ fn files_with_names_like_ours_stay() {
     for name in names {
         place.write(name, "mine");
     }
-    // What a killed process left behind: see `crates/image/src/atomic.rs`.
+    // What a killed process left behind: see `pictures/image/src/atomic.rs`.
     let dead = ".antumbra-0000000000000007-1e2dc709cf02a3cf.tmp";
     place.write(dead, "half a pict");
     place.run(&["render", "room.pbrt", "-o", "o.exr"]).expect(0);

@@ -1,5 +1,5 @@
 //! Answers that stay the same over machines, versions and languages: a check sum of their bits, which the tests of the
-//! Python package compare too (`crates/python/tests/test_known_answers.py` makes the same scene and rays).
+//! Python package compare too (`interfaces/python/tests/test_known_answers.py` makes the same scene and rays).
 
 use antumbra::{Bvh, Geometry, INVALID_ID, Isa, Ray, Recipe, Width};
 

@@ -1,7 +1,7 @@
 //! Whole jobs, from a mesh in memory to finished numbers, beside programs that use Embree 4.
 //!
 //!     bench/get-embree
-//!     ANTUMBRA_SCENES=FOLDER cargo run --release --manifest-path bench/jobs/Cargo.toml -- bench/embree/LIBRARY [JOB...]
+//!     ANTUMBRA_SCENES=FOLDER cargo run --release --manifest-path science/bench/jobs/Cargo.toml -- bench/embree/LIBRARY [JOB...]
 //!
 //! Ours calls the crates as a user would. Embree's program is the best that we can write with few lines: it sorts points and
 //! directions, and uses single calls or packets of 16, whichever a trial on an eighth of the job finds faster. Both are functions

@@ -1,7 +1,7 @@
 //! Three small programs, each written with three crates: a baker of ambient occlusion, a matrix of who sees whom, and a world
 //! of instances. Prints how long they take, how they differ and how long their texts are.
 //!
-//!     cargo run --release --manifest-path bench/rust-crates/Cargo.toml -- [--rounds N] [--small] [--json FILE]
+//!     cargo run --release --manifest-path science/bench/rust-crates/Cargo.toml -- [--rounds N] [--small] [--json FILE]
 //!
 //! Everything runs on one thread, the crates in turns. Set `RAYON_NUM_THREADS=1` for builds on one thread as well, and
 //! `RUSTFLAGS="-C target-cpu=native"` for the other crates: antumbra chooses its instruction set by itself.
