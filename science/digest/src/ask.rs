@@ -1,4 +1,4 @@
-//! Every question that can be asked of a tree, in every way that there is to ask it: all calls of queries are here.
+//! Every query of a tree, by every call that there is for it: all calls of queries are here.
 //!
 //! Names of questions are words of the digest, and stay when what they call is renamed.
 
@@ -21,7 +21,7 @@ pub struct Answer {
     pub place: Option<u64>,
 }
 
-/// Which hits count: every condition alone, and all together.
+/// Which hits count: every condition by itself, and all together.
 pub const CONDITIONS: [&str; 7] = ["none", "mask", "masks", "except", "filter", "closed", "all"];
 
 /// Rays, points and what conditions need to know.
@@ -34,7 +34,7 @@ pub struct Questions<'a> {
     directions: Directions,
 }
 
-/// Whether a hit counts: by its names alone, so that rounding of distances never changes who is hit.
+/// Whether a hit counts: by its names only, so that rounding of distances never changes who is hit.
 fn counts(ray: usize, hit: &Hit) -> bool {
     !(ray as u32 + 3 * hit.prim_id + 5 * hit.geom_id + hit.inst_id % 97).is_multiple_of(3)
 }
@@ -237,7 +237,7 @@ impl<'a> Questions<'a> {
         batch
     }
 
-    /// Rays without conditions: one by one, few at a time, and what is asked about a hit.
+    /// Rays without conditions: one by one, few at a time, and the queries about a hit.
     fn plain(&self, bvh: &Bvh, answers: &mut Vec<Answer>) {
         let name = ("none", "plain");
         let found: Vec<_> = self.rays.iter().map(|ray| bvh.occluded(ray)).collect();

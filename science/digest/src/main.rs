@@ -1,7 +1,7 @@
 //! Digest of everything that the kernel answers, counts and saves, a case per line: the same before and after a change
 //! that should change nothing.
 //!
-//! `cargo build -p antumbra-cli -p antumbra-digest` builds it beside the program, of the same kernel; alone it would get a
+//! `cargo build -p antumbra-cli -p antumbra-digest` builds it beside the program, of the same kernel; by itself it would get a
 //! kernel of its own, compiled once more for other features of a dependency.
 //!
 //! Names of cases stay when the interface of the kernel changes. Then only `ask` (queries), `trees` (builds, counts, files)
@@ -17,7 +17,7 @@
 //! | `saved SCENE RECIPE wWIDTH` | hash and length of the bytes, and figures of the tree |
 //! | `order`, `collapse`, `builder SCENE NAME wWIDTH` | the same of every entry of the lists, and what they count |
 //!
-//! Answers are promised to be the same for every tree, level and way to ask. Each way is tried; where one disagrees with the
+//! Answers are promised to be the same for every tree, level and call. Each is tried; where one disagrees with the
 //! first, it has a row of its own, whose name goes on with the tree, the level and the way.
 
 mod ask;

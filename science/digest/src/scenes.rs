@@ -14,7 +14,7 @@ use antumbra_testkit::{Mesh, Rng, TestRay, mesh, rays};
 
 pub type Transform = [[f32; 4]; 3];
 
-/// Geometries, objects and where they are, and what is asked about them.
+/// Geometries, objects and where they are, and what is queried.
 pub struct Scene {
     pub world: Vec<Geometry<'static>>,
     pub objects: Vec<Vec<Geometry<'static>>>,
@@ -35,7 +35,7 @@ pub struct Moving {
 /// Makes a scene.
 pub type Generator = fn(&mut Rng) -> Scene;
 
-/// The scenes that stand still, by name. [`moving`] is the tenth.
+/// The scenes that do not move, by name. [`moving`] is the tenth.
 pub const STILL: [(&str, Generator); 9] = [
     ("city", city),
     ("quads", quads),

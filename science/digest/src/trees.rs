@@ -88,7 +88,7 @@ fn world(scene: &Scene, width: Width) -> (World, Object) {
     (world.expect(SOUND), objects.swap_remove(0))
 }
 
-/// Trees that have masks: the given one, and where there are instances that of a world which can move.
+/// Trees that have masks: the given one, and where there are instances the tree of a world that can move.
 pub fn masked(scene: &Scene, width: Width, mut bvh: Bvh) -> Vec<(&'static str, Bvh)> {
     let list = |count: usize, by: usize| (0..count).map(|i| [1, 2, 3, 0, 5][i * by % 5]).collect();
     let masks = Masks::new()

@@ -73,7 +73,7 @@ impl Bvh {
     ///
     /// Finds the primitive by its ids along the ray, which takes about as long as a query of one ray. `None` if the ray
     /// comes by no such primitive, if the three corners lie on a line, or if user geometry returns none. Where something moves,
-    /// the normal is that of time 0: for other times see [`Batch::surfaces`](crate::Batch::surfaces).
+    /// the normal is at time 0: for other times see [`Batch::surfaces`](crate::Batch::surfaces).
     ///
     /// ```
     /// # use antumbra::{Bvh, Geometry, Ray, Recipe};

@@ -3,7 +3,7 @@
 //! Read in this order; each step uses those before it:
 //!
 //! 1. [`crate::geometry::ray_setup`] checks a ray and prepares it, and proves that no box that matters is missed.
-//! 2. `view`: what a ray meets at an index, now or at its time. `step`: the node step and the leaf step that every traversal consists of; `stack`: children still to visit.
+//! 2. `view`: what is at an index for a ray, now or at its time. `step`: the node step and the leaf step that every traversal consists of; `stack`: children still to visit.
 //! 3. `query`: how occlusion and closest hits differ.
 //! 4. `single`: one ray after another, the shortest of the loops.
 //! 5. `ray_batch`: rays of a batch, with conditions and reports. `stream`: many rays in flight, one step of each in turn;

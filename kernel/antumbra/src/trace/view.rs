@@ -1,4 +1,4 @@
-//! What a ray meets at an index: boxes, triangles and instances as they are, or as they are at the time of the ray.
+//! What is at an index for a ray: boxes, triangles and instances as they are, or as they are at the time of the ray.
 //!
 //! Traversals and queries see a tree through a view and know nothing of time. [`Still`] takes no room and no instruction.
 

@@ -16,7 +16,7 @@ use crate::geometry::sound::is_sound;
 type Keys = [[[f32; 3]; 3]; 2];
 
 /// Scenes that move while rays are traced: see [`Geometry::moving`](crate::Geometry::moving) and
-/// [`Instance::moving`](crate::Instance::moving). All other methods tell of time 0.
+/// [`Instance::moving`](crate::Instance::moving). All other methods are of time 0.
 impl Primitives {
     /// Whether anything moves.
     pub fn moves(&self) -> bool {
