@@ -249,7 +249,7 @@ fn chances(
     let entered = f64::from(log.node_entered(index));
     let hits = child_hits.map(|hits| hits as f64);
     let mut box_hits = [0.0; MAX_WIDTH];
-    for (slot, hits) in box_hits.iter_mut().enumerate().take(len) {
+    for (slot, hits) in box_hits.iter_mut().enumerate().take(node.width()) {
         *hits = f64::from(log.lane_hits(index, node.lane(slot)));
     }
     match estimate {

@@ -241,11 +241,11 @@ fn every_builder_takes_any_input() {
 
 #[test]
 fn builders_are_known_by_their_names() {
-    for builder in BUILDERS {
+    for builder in Builder::ALL {
         assert_eq!(builder.name().parse(), Ok(builder));
     }
     let error = "lego".parse::<Builder>().expect_err("no such builder");
-    for builder in BUILDERS {
+    for builder in Builder::ALL {
         assert!(error.to_string().contains(builder.name()), "{error}");
     }
 }

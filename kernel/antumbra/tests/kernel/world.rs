@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use crate::instances::{Expected, Scene};
-use crate::support::{BUILDERS, Stripes, bits, config, cutouts, geometry, orders, square};
+use crate::support::{Stripes, bits, config, cutouts, geometry, orders, square};
 use crate::transforms::{IDENTITY, transform, translation};
 use antumbra::parts::{Cost, Steps};
-use antumbra::recipe::Preset;
+use antumbra::recipe::{Builder, Preset};
 use antumbra::{
     Bvh, Error, Functions, Geometry, Instance, Object, Primitives, Ray, Recipe, Saved,
     UserGeometry, Width, World,
@@ -18,7 +18,7 @@ use proptest::prelude::*;
 /// A recipe like any.
 fn recipe(rng: &mut Rng) -> Recipe {
     let preset = Preset::ALL[rng.below(Preset::ALL.len())];
-    let builder = BUILDERS[rng.below(BUILDERS.len())];
+    let builder = Builder::ALL[rng.below(Builder::ALL.len())];
     let width = Width::ALL[rng.below(Width::ALL.len())];
     preset.recipe().builder(builder).width(width)
 }
