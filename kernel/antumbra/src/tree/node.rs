@@ -215,7 +215,7 @@ impl<const N: usize> Node<N> {
     }
 }
 
-/// A node of any width, for code that is compiled once: whatever makes, changes or checks trees. Queries take [`Node`]s.
+/// A node of any width, for code that is compiled once: whatever makes, changes or checks trees. Queries take nodes of one width.
 #[derive(Clone, Copy)]
 pub struct NodeRef<'a> {
     /// `[axis][side][lane]`, as in a [`Node`].

@@ -63,7 +63,7 @@ impl SlotOrder {
         }
     }
 
-    /// Leaves the leaves as they are; a place for every slot, to be [set](Self::set) for all nodes.
+    /// Leaves the leaves as they are; a place for every slot, to be set for all nodes.
     pub fn of_nodes(tree: &Tree) -> Self {
         let shape = tree.shape();
         Self {
