@@ -93,8 +93,8 @@ pub trait Steps: Sized {
     fn log_of(&self, rays: &[Ray], kind: LogKind, seed: u64) -> Log;
 
     /// Puts a tree fresh from its collapse into the order of a recipe, learned from `log` or else from `rays`, and has it
-    /// prefetch as the recipe says. Where the
-    /// order learns and there is neither, the tree stays as it is. Returns the log, if one had to be made.
+    /// prefetch as the recipe says. Where the order learns and there is neither, the tree stays as it is. Returns the log, if
+    /// one had to be made.
     ///
     /// The [report](Bvh::report) then has the number of rays learned from, and the predicted cost before and after.
     ///

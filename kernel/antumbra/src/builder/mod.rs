@@ -77,6 +77,11 @@ impl Builder {
 ///
 /// It makes binary trees over the primitives of the world and of each object. What comes after it is the kernel's:
 /// instances are put into the tree of the world, and the trees become wide.
+///
+/// A primitive may be in several leaves. If the boxes of these leaves are parts of its own box, as after a spatial split, files
+/// keep the number of primitives. If they are whole, as of two equal subtrees, answers are right after
+/// [`Bvh::from_bytes`](crate::Bvh::from_bytes), but the report counts the primitive in each leaf, and
+/// [`Bvh::validate`](crate::Bvh::validate) says so.
 pub trait Grow: Row {
     /// Whether it builds for training rays.
     fn needs_rays(&self) -> bool {
