@@ -87,11 +87,8 @@ fn a_row_for_every_order_and_width() {
         assert_eq!(row["equal_answers"], true);
         assert_eq!(row["render_time"], "composed");
         assert!(row["measured_seconds"].is_null() && row["measured_renderings"] == 0);
-        let order: Order = row["order"]
-            .as_str()
-            .expect("a name")
-            .parse()
-            .expect("an order");
+        let name = row["order"].as_str().expect("a name");
+        let order = antumbra_trees::order(name).expect("an order");
         let learns = order.learns();
         // The model knows nothing of orders that pick by ray, and nothing of use from a log of leaf hits alone.
         let boxes = order.log_kind().is_some_and(|kind| kind.boxes);
