@@ -27,7 +27,7 @@ AVX512, AVX2 = "zen4-2026-11-24.json", "zen4-2026-11-24-avx2.json"
 
 
 def call(query, api):
-    return f"`{query}_batch`" if api == "batch" else f"`{query}`"
+    return f"`{query}`, batch" if api == "batch" else f"`{query}`"
 
 
 def beside_embree():
@@ -55,7 +55,7 @@ def embree_by_scene(name, kinds=("shadow", "diffuse")):
         for query, api in CALLS:
             lines.append([f"{call(query, api)}, {rays}"] + [f"{rows[s, rays, query, api]['ratio_to_embree']:.2f}" for s in scenes])
     batch = [rows[s, "shadow", "occluded", "batch"] for s in scenes]
-    lines.append(["`occluded_batch`, shadow, million rays per second"] + [f"{row['mrays_per_s']:.1f}" for row in batch])
+    lines.append(["`occluded`, batch, shadow, million rays per second"] + [f"{row['mrays_per_s']:.1f}" for row in batch])
     lines.append(["node tests per shadow ray"] + [f"{row['node_tests']:.1f}" for row in batch])
     lines.append(["primitive tests per shadow ray"] + [f"{row['prim_tests']:.1f}" for row in batch])
     return table(["call, rays"] + [scene.replace("builtin:", "") for scene in scenes], lines)

@@ -245,7 +245,7 @@ def timed(of):
         {(r["kind"], r["query"], r["api"]): r["ratio_to_embree"] for r in of.document(f"zen4-2026-11-24-kinds-{s}.json")["kinds"] if r["engine"] == "antumbra"}
         for s in ("sponza", "city")
     ]
-    for name, key in (("refit", ("refit", "update", "single")), ("`closest`", ("points", "closest", "single")), ("`closest_batch`, one thread", ("points", "closest", "batch"))):
+    for name, key in (("refit", ("refit", "update", "single")), ("`closest`", ("points", "closest", "single")), ("`closest`, batch, one thread", ("points", "closest", "batch"))):
         yield BENCH, f"| {name} | " + " | ".join(f"{scene[key]:.2f}" for scene in scenes) + " |"
 
 

@@ -70,7 +70,7 @@ MOTION = "zen3-2026-11-26-motion.txt"
 
 def motion():
     calls = ["occluded_batch", "occluded", "intersect_batch", "intersect"]
-    head = ["scene, two keys"] + [f"`{call}`" for call in calls]
+    head = ["scene, two keys", "`occluded`, batch", "`occluded`", "`intersect`, batch", "`intersect`"]
     rows = []
     for line in lines(MOTION):
         city = re.match(r"city, moved by ([\d.]+) of its size", line)
@@ -97,7 +97,7 @@ def few_rays():
     ours = [f"{few(f'batch of {size}'):.2f}" for size in SIZES]
     theirs = [f"{few(f'rtcOccluded{size}'):.2f}" if size in (4, 8, 16) else "" for size in SIZES]
     head = ["rays in a call"] + [spaced(size) for size in SIZES]
-    return head, [["`occluded_batch`", *ours], ["Embree's packets", *theirs]]
+    return head, [["`occluded`, batch", *ours], ["Embree's packets", *theirs]]
 
 
 def built(scene, recipe):
@@ -147,7 +147,7 @@ def points():
     ]
     head = ["points"]
     for scene in scenes:
-        head += [f"{scene.replace('builtin:', '')}: `closest`", "`closest_batch`"]
+        head += [f"{scene.replace('builtin:', '')}: `closest`", "batch"]
     return head, rows
 
 

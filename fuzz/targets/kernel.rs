@@ -319,8 +319,8 @@ fuzz_target!(|bytes: &[u8]| {
             bvh.set_isa(isa);
             let mut found_occluded = vec![false; rays.len()];
             let mut found_hits = vec![None; rays.len()];
-            bvh.occluded_batch(&rays, &mut found_occluded);
-            bvh.intersect_batch(&rays, &mut found_hits);
+            bvh.batch(&rays).occluded_into(&mut found_occluded);
+            bvh.batch(&rays).intersect_into(&mut found_hits);
             for (index, ray) in rays.iter().enumerate() {
                 let place = (width, isa.level(), ray);
                 assert_eq!(found_occluded[index], occluded[index], "{place:?}");
@@ -361,8 +361,8 @@ fn answers_as(bvh: &Bvh, primitives: &Primitives, rays: &[Ray], place: &str) {
     bvh.validate().expect("a sound tree");
     let mut occluded = vec![false; rays.len()];
     let mut hits = vec![None; rays.len()];
-    bvh.occluded_batch(rays, &mut occluded);
-    bvh.intersect_batch(rays, &mut hits);
+    bvh.batch(rays).occluded_into(&mut occluded);
+    bvh.batch(rays).intersect_into(&mut hits);
     for (index, ray) in rays.iter().enumerate() {
         assert_eq!(occluded[index], brute.occluded(ray), "{place} {ray:?}");
         assert_eq!(

@@ -108,8 +108,8 @@ fn ask(mut bvh: Bvh) {
         bvh.set_isa(isa);
         let mut occluded = vec![false; rays.len()];
         let mut hits = vec![None; rays.len()];
-        bvh.occluded_batch(&rays, &mut occluded);
-        bvh.intersect_batch(&rays, &mut hits);
+        bvh.batch(&rays).occluded_into(&mut occluded);
+        bvh.batch(&rays).intersect_into(&mut hits);
         for ((ray, hit), occluded) in rays.iter().zip(&hits).zip(&occluded) {
             assert_eq!(bvh.occluded(ray), *occluded);
             if let Some(hit) = hit {

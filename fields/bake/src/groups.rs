@@ -190,7 +190,7 @@ impl Sensors {
         });
         let rays: Vec<Ray> = rays.collect();
         let mut hits = vec![None; rays.len()];
-        bvh.intersect_batch(&rays, &mut hits);
+        bvh.batch(&rays).intersect_into(&mut hits);
         let found = rays.iter().zip(hits).map(|(ray, hit)| {
             let hit = hit?;
             // A ray that leaves by a gap of its own surface hits another one at a slant.

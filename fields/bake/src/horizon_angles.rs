@@ -121,7 +121,7 @@ impl HorizonJob {
             rays.extend(open.iter().map(|(_, ray)| *ray));
             hits.clear();
             hits.resize(rays.len(), false);
-            bvh.occluded_batch(&rays, &mut hits);
+            bvh.batch(&rays).occluded_into(&mut hits);
             for (&(index, _), &is_hit) in open.iter().zip(&hits) {
                 let [closed, open_end] = &mut ends[index];
                 let middle = 0.5 * (*closed + *open_end);

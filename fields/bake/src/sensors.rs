@@ -124,7 +124,7 @@ impl Sensors {
             let range = first..(first + CELLS).min(width * height);
             let rays: Vec<Ray> = range.clone().map(ray).collect();
             let mut hits = vec![None; rays.len()];
-            bvh.intersect_batch(&rays, &mut hits);
+            bvh.batch(&rays).intersect_into(&mut hits);
             memory::grow(&mut points, "sensors", rays.len())?;
             memory::grow(&mut normals, "sensors", rays.len())?;
             memory::grow(&mut cells, "sensors", rays.len())?;

@@ -87,7 +87,7 @@ impl<'a> ViewFactorJob<'a> {
             let last = (first + RAYS).min(samples);
             let rays: Vec<Ray> = (first..last).map(|index| emitter.ray(index)).collect();
             let mut hits = vec![None; rays.len()];
-            bvh.intersect_batch(&rays, &mut hits);
+            bvh.batch(&rays).intersect_into(&mut hits);
             let mut counts = vec![0_u64; width];
             for hit in hits {
                 let surface = hit.and_then(|hit| self.of_prim.get(hit.prim_id as usize));

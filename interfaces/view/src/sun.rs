@@ -97,7 +97,7 @@ impl Sights {
         let rays: Vec<Option<Ray>> = self.pixels.par_iter().map(faces).collect();
         let known: Vec<Ray> = rays.iter().copied().flatten().collect();
         let mut occluded = vec![false; known.len()];
-        bvh.occluded_batch(&known, &mut occluded);
+        bvh.batch(&known).occluded_into(&mut occluded);
         let mut answers = occluded.iter();
         for (value, ray) in values.iter_mut().zip(&rays) {
             if ray.is_some() && answers.next() == Some(&false) {

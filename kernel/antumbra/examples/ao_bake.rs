@@ -165,7 +165,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         rays.extend((first..count.min(first + BATCH)).map(ray));
         occluded.resize(rays.len(), false);
         let start = Instant::now();
-        bvh.occluded_batch(&rays, &mut occluded);
+        bvh.batch(&rays).occluded_into(&mut occluded);
         seconds += start.elapsed().as_secs_f64();
         for (index, occluded) in (first..).zip(&occluded) {
             open[index / SAMPLES] += u32::from(!occluded);

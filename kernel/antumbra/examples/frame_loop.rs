@@ -162,7 +162,7 @@ fn main() -> Result<(), Error> {
             let refit = start.elapsed();
 
             let start = Instant::now();
-            world.bvh().intersect_batch(&pixels, &mut hits);
+            world.bvh().batch(&pixels).intersect_into(&mut hits);
             let seen = start.elapsed();
 
             shadows = (pixels.iter().zip(&hits))
@@ -176,7 +176,7 @@ fn main() -> Result<(), Error> {
             occluded.clear();
             occluded.resize(shadows.len(), false);
             let start = Instant::now();
-            world.bvh().occluded_batch(&shadows, &mut occluded);
+            world.bvh().batch(&shadows).occluded_into(&mut occluded);
             let shadow = start.elapsed();
 
             let start = Instant::now();

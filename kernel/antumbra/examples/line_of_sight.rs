@@ -79,7 +79,7 @@ fn main() -> Result<(), Error> {
         rays.clear();
         rays.extend((first..pairs.min(first + BATCH)).map(ray));
         blocked.resize(rays.len(), false);
-        bvh.occluded_batch(&rays, &mut blocked);
+        bvh.batch(&rays).occluded_into(&mut blocked);
         for (pair, blocked) in (first..).zip(&blocked) {
             seen[pair / places.len()] += u32::from(!blocked);
         }
@@ -104,7 +104,7 @@ fn main() -> Result<(), Error> {
         .collect();
     let mut blocked = vec![false; back.len()];
     let start = Instant::now();
-    bvh.occluded_batch(&back, &mut blocked);
+    bvh.batch(&back).occluded_into(&mut blocked);
     let seconds = start.elapsed().as_secs_f64();
     let again = blocked.iter().filter(|blocked| !**blocked).count() as u32;
     // But for rays that graze the ground, where rounding decides.

@@ -85,7 +85,7 @@ fn main() -> Result<(), Error> {
             world.set_instances(&instances)?;
             update = update.min(start.elapsed().as_secs_f64());
             let start = Instant::now();
-            world.bvh().occluded_batch(&rays, &mut occluded);
+            world.bvh().batch(&rays).occluded_into(&mut occluded);
             query = query.min(start.elapsed().as_secs_f64());
         }
         let blocked = occluded.iter().filter(|occluded| **occluded).count();
@@ -105,7 +105,7 @@ fn main() -> Result<(), Error> {
     let mut query = f64::INFINITY;
     for _ in 0..FRAMES {
         let start = Instant::now();
-        whole.occluded_batch(&rays, &mut again);
+        whole.batch(&rays).occluded_into(&mut again);
         query = query.min(start.elapsed().as_secs_f64());
     }
     let rate = rays.len() as f64 / query / 1e6;

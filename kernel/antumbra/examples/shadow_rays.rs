@@ -31,8 +31,7 @@ fn main() -> Result<(), Error> {
         .iter()
         .map(|point| Ray::between(*point, lamp))
         .collect();
-    let mut in_shadow = vec![false; rays.len()];
-    bvh.occluded_batch(&rays, &mut in_shadow);
+    let in_shadow = bvh.batch(&rays).occluded();
     // ANCHOR_END: book
 
     // ANCHOR: learn
@@ -40,8 +39,7 @@ fn main() -> Result<(), Error> {
     let learned = Bvh::learn(&geometry, &sample, &Recipe::default())?;
     // ANCHOR_END: learn
 
-    let mut again = vec![false; rays.len()];
-    learned.occluded_batch(&rays, &mut again);
+    let again = learned.batch(&rays).occluded();
     assert_eq!(in_shadow, again, "the answers never depend on the tree");
     let shadows = in_shadow.iter().filter(|shadow| **shadow).count();
     println!("{shadows} of {} points are in shadow", points.len());

@@ -10,9 +10,7 @@
 //! let bvh = Bvh::build(&geometry, &Recipe::default())?;
 //!
 //! let rays = [Ray::between([0.2, 0.2, 0.0], [0.2, 0.2, 2.0]), Ray::between([2.0; 3], [3.0; 3])];
-//! let mut occluded = [false; 2];
-//! bvh.occluded_batch(&rays, &mut occluded);
-//! assert_eq!(occluded, [true, false]);
+//! assert_eq!(bvh.batch(&rays).occluded(), [true, false]);
 //!
 //! let learned = Bvh::learn(&geometry, &rays, &Recipe::default())?;
 //! let hit = learned.intersect(&rays[0]).expect("a triangle is in the way");

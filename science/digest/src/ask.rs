@@ -258,8 +258,8 @@ impl<'a> Questions<'a> {
         let (mut found, mut hits) = (vec![false; self.rays.len()], vec![None; self.rays.len()]);
         let few = self.rays.chunks(21);
         for ((few, found), hits) in few.zip(found.chunks_mut(21)).zip(hits.chunks_mut(21)) {
-            bvh.occluded_batch(few, found);
-            bvh.intersect_batch(few, hits);
+            bvh.batch(few).occluded_into(found);
+            bvh.batch(few).intersect_into(hits);
         }
         answers.push(Sums::flags(&found).answer("occluded", ("none", "few")));
         answers.push(Sums::hits(&hits).answer("closest", ("none", "few")));

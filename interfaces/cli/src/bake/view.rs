@@ -46,7 +46,7 @@ impl View {
                 .map(|(x, film)| (x, camera.ray(film, [0.5; 2])))
                 .unzip();
             let mut hits = vec![None; rays.len()];
-            ground.bvh.intersect_batch(&rays, &mut hits);
+            ground.bvh.batch(&rays).intersect_into(&mut hits);
             for ((ray, hit), x) in rays.iter().zip(&hits).zip(columns) {
                 let Some(hit) = hit else { continue };
                 let Some(normal) = ground.bvh.normal(ray, hit) else {

@@ -61,6 +61,23 @@ pub struct Batch<'a> {
 
 impl Bvh {
     /// Rays to be traced together: a list of [`Ray`]s, or [`RayColumns`](crate::RayColumns).
+    ///
+    /// More than 16 384 rays are shared among the threads of the current rayon pool, if the `parallel` feature is on; up to as
+    /// many stay on the calling thread. [`Batch::on_this_thread`] keeps all of them there.
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
+    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+    /// let rays = [[0.2, 0.2, 0.0], [5.0, 5.0, 0.0]].map(|from| Ray::new(from, [0.0, 0.0, 1.0]));
+    /// assert_eq!(bvh.batch(&rays).occluded(), [true, false]);
+    /// // Into memory that is there already.
+    /// let mut hits = [None; 2];
+    /// bvh.batch(&rays).intersect_into(&mut hits);
+    /// assert!(hits[0].is_some() && hits[1].is_none());
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
     pub fn batch<'a>(&'a self, rays: impl Into<Rays<'a>>) -> Batch<'a> {
         Batch {
             bvh: self,
@@ -76,51 +93,6 @@ impl Bvh {
             },
             order: RayOrder::default(),
         }
-    }
-
-    /// Whether anything lies in the interval of each ray: `occluded[i]` answers `rays[i]`. Short for
-    /// `bvh.batch(rays).occluded_into(occluded)`.
-    ///
-    /// More than 16 384 rays are shared among the threads of the current rayon pool, if the `parallel` feature is on; up to as
-    /// many stay on the calling thread. [`Batch::on_this_thread`] keeps all of them there.
-    ///
-    /// ```
-    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
-    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
-    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
-    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
-    /// let rays = [[0.2, 0.2, 0.0], [5.0, 5.0, 0.0]].map(|from| Ray::new(from, [0.0, 0.0, 1.0]));
-    /// let mut blocked = [false; 2];
-    /// bvh.occluded_batch(&rays, &mut blocked);
-    /// assert_eq!(blocked, [true, false]);
-    /// # Ok::<(), antumbra::Error>(())
-    /// ```
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn occluded_batch(&self, rays: &[Ray], occluded: &mut [bool]) {
-        self.batch(rays).occluded_into(occluded);
-    }
-
-    /// The closest hit of each ray: `hits[i]` answers `rays[i]`. At equal distances the smallest
-    /// (inst_id, geom_id, prim_id) wins. Shared among threads as in [`Bvh::occluded_batch`].
-    ///
-    /// ```
-    /// # use antumbra::{Bvh, Geometry, Ray, Recipe};
-    /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
-    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
-    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
-    /// let rays = [[0.2, 0.2, 0.0], [5.0, 5.0, 0.0]].map(|from| Ray::new(from, [0.0, 0.0, 1.0]));
-    /// let mut hits = [None; 2];
-    /// bvh.intersect_batch(&rays, &mut hits);
-    /// assert!(hits[0].is_some() && hits[1].is_none());
-    /// # Ok::<(), antumbra::Error>(())
-    /// ```
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn intersect_batch(&self, rays: &[Ray], hits: &mut [Option<Hit>]) {
-        self.batch(rays).intersect_into(hits);
     }
 }
 

@@ -290,7 +290,7 @@ mod tests {
             Isa::best(),
         );
         let mut expected = vec![false; rays.len()];
-        plain.occluded_batch(&rays, &mut expected);
+        plain.batch(&rays).occluded_into(&mut expected);
         plain.tree.pick = Some(&Farthest);
 
         let Nodes::W8(nodes) = &plain.tree.nodes else {
@@ -346,7 +346,7 @@ mod tests {
         }
         // By the rule of the tree, and without an observer.
         let mut answers = vec![false; rays.len()];
-        plain.occluded_batch(&rays, &mut answers);
+        plain.batch(&rays).occluded_into(&mut answers);
         assert_eq!(answers, expected);
     }
 }

@@ -57,9 +57,9 @@ fn batches_of_every_length_equal_single_queries() {
                     });
                     length
                 ];
-                bvh.occluded_batch(rays, &mut found);
+                bvh.batch(rays).occluded_into(&mut found);
                 assert_eq!(found, occluded[..length], "{place}");
-                bvh.intersect_batch(rays, &mut found_hits);
+                bvh.batch(rays).intersect_into(&mut found_hits);
                 assert_eq!(found_hits, hits[..length], "{place}");
                 found.fill(true);
                 found_hits.fill(None);
@@ -94,8 +94,8 @@ fn the_number_of_threads_changes_no_answer() {
         answers.push(pool.install(|| {
             let mut occluded = vec![false; rays.len()];
             let mut hits = vec![None; rays.len()];
-            bvh.occluded_batch(&rays, &mut occluded);
-            bvh.intersect_batch(&rays, &mut hits);
+            bvh.batch(&rays).occluded_into(&mut occluded);
+            bvh.batch(&rays).intersect_into(&mut hits);
             (occluded, hits)
         }));
     }
@@ -106,5 +106,6 @@ fn the_number_of_threads_changes_no_answer() {
 #[should_panic(expected = "one answer per ray")]
 fn slices_of_different_length_panic() {
     let (bvh, rays) = tree(Width::W4, Isa::best());
-    bvh.occluded_batch(&rays, &mut vec![false; rays.len() - 1]);
+    bvh.batch(&rays)
+        .occluded_into(&mut vec![false; rays.len() - 1]);
 }

@@ -31,7 +31,7 @@ fn world(seed: u64) -> (Primitives, Vec<Ray>) {
 
 fn answers(bvh: &Bvh, rays: &[Ray]) -> Vec<bool> {
     let mut occluded = vec![false; rays.len()];
-    bvh.occluded_batch(rays, &mut occluded);
+    bvh.batch(rays).occluded_into(&mut occluded);
     occluded
 }
 

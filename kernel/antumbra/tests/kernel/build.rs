@@ -104,7 +104,7 @@ fn an_empty_scene_is_fine() {
         let ray = Ray::new([0.0; 3], [0.0, 0.0, 1.0]);
         assert!(!bvh.occluded(&ray));
         assert_eq!(bvh.intersect(&ray), None);
-        bvh.occluded_batch(&[], &mut []);
+        bvh.batch(&[]).occluded_into(&mut []);
     }
 }
 

@@ -123,7 +123,7 @@ impl Opacity for Uniform {
 fn count_occluded(geometries: &[Geometry<'_>], rays: &[Ray]) -> usize {
     let mut occluded = vec![false; rays.len()];
     let bvh = Bvh::build(geometries, &Default::default()).expect("indices in range");
-    bvh.occluded_batch(rays, &mut occluded);
+    bvh.batch(rays).occluded_into(&mut occluded);
     occluded.iter().filter(|occluded| **occluded).count()
 }
 
@@ -193,8 +193,8 @@ fn learned_trees_equal_brute_force() {
         bvh.validate().expect("a valid tree");
         let mut occluded = vec![false; rays.len()];
         let mut hits = vec![None; rays.len()];
-        bvh.occluded_batch(&rays, &mut occluded);
-        bvh.intersect_batch(&rays, &mut hits);
+        bvh.batch(&rays).occluded_into(&mut occluded);
+        bvh.batch(&rays).intersect_into(&mut hits);
         for (index, ray) in rays.iter().enumerate() {
             let place = format!("seed {seed} {builder} x{width} {} {ray:?}", isa.level());
             assert_eq!(occluded[index], brute.occluded(ray), "{place}");
@@ -254,7 +254,7 @@ fn instances_stop_rays_independently() {
     let tree = BinaryTree::build(&primitives, Builder::default());
     let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, Width::W8, Isa::best());
     let mut occluded = vec![false; COUNT];
-    bvh.occluded_batch(&rays, &mut occluded);
+    bvh.batch(&rays).occluded_into(&mut occluded);
     let found = occluded.iter().filter(|occluded| **occluded).count() as f64;
     let (mean, deviation) = (0.875 * COUNT as f64, (0.875 * 0.125 * COUNT as f64).sqrt());
     assert!(
@@ -418,8 +418,8 @@ fn coverage_changes_no_answer() {
         let bvh = Bvh::build(&geometries, &Default::default()).expect("indices in range");
         let report = bvh.report();
         let (mut occluded, mut hits) = (vec![false; rays.len()], vec![None; rays.len()]);
-        bvh.occluded_batch(&rays, &mut occluded);
-        bvh.intersect_batch(&rays, &mut hits);
+        bvh.batch(&rays).occluded_into(&mut occluded);
+        bvh.batch(&rays).intersect_into(&mut hits);
         let hits: Vec<_> = hits.into_iter().map(bits).collect();
         (occluded, hits, report)
     });
@@ -550,9 +550,9 @@ fn threads_and_batches_change_no_answer() {
         answers.push(pool.build().expect("a pool").install(|| {
             let bvh = Bvh::build(&geometries, &Default::default()).expect("indices in range");
             let (mut occluded, mut hits) = (vec![false; rays.len()], vec![None; rays.len()]);
-            bvh.occluded_batch(&rays, &mut occluded);
+            bvh.batch(&rays).occluded_into(&mut occluded);
             for (rays, hits) in rays.chunks(997).zip(hits.chunks_mut(997)) {
-                bvh.intersect_batch(rays, hits);
+                bvh.batch(rays).intersect_into(hits);
             }
             (occluded, hits)
         }));

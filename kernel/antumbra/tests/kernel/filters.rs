@@ -34,7 +34,7 @@ fn the_filter_is_asked_of_mixed_triangles_only() {
     let bvh = Bvh::build(&geometries, &Default::default()).expect("indices in range");
     filter.0.store(0, Ordering::Relaxed);
     let mut occluded = vec![false; rays.len()];
-    bvh.occluded_batch(&rays, &mut occluded);
+    bvh.batch(&rays).occluded_into(&mut occluded);
     let below = |ray: &Ray| ray.org[1] < ray.org[0];
     for (ray, occluded) in rays.iter().zip(occluded) {
         assert_eq!(occluded, below(ray), "{ray:?}");
@@ -82,7 +82,7 @@ fn one_of_a_pattern_is_asked_for_all() {
             .map(|asked| core::mem::take(&mut **asked).len())
     };
     asked();
-    bvh.occluded_batch(&rays, &mut occluded);
+    bvh.batch(&rays).occluded_into(&mut occluded);
     assert_eq!(asked(), [2, 0]);
     for (ray, occluded) in rays.iter().zip(occluded) {
         assert_eq!(occluded, brute.occluded(ray), "seed {seed} {ray:?}");
@@ -114,7 +114,7 @@ fn nothing_is_asked_behind_an_occluder() {
     let bvh = bvh.expect("indices in range");
     let mut occluded = vec![false; rays.len()];
     filter.0.store(0, Ordering::Relaxed);
-    bvh.occluded_batch(&rays, &mut occluded);
+    bvh.batch(&rays).occluded_into(&mut occluded);
     let stopped = occluded.iter().filter(|&&occluded| occluded).count();
     assert!((300..700).contains(&stopped), "{stopped}");
     assert_eq!(filter.0.load(Ordering::Relaxed), stopped);

@@ -167,8 +167,8 @@ impl Expected {
             .unwrap_or_else(|broken| panic!("{place}: {broken}"));
         let mut occluded = vec![false; rays.len()];
         let mut hits = vec![None; rays.len()];
-        bvh.occluded_batch(rays, &mut occluded);
-        bvh.intersect_batch(rays, &mut hits);
+        bvh.batch(rays).occluded_into(&mut occluded);
+        bvh.batch(rays).intersect_into(&mut hits);
         for (index, ray) in rays.iter().enumerate() {
             let place = || format!("{place}, ray {index}: {ray:?}");
             let (expected_occluded, expected_hit) = (self.occluded[index], bits(self.hits[index]));
@@ -350,8 +350,8 @@ fn batches_of_every_length() {
     for count in [0, 1, 7, 8, 9, 31, 33, 100] {
         let rays = &rays[..count];
         let mut answers = (vec![false; count], vec![None; count]);
-        bvh.occluded_batch(rays, &mut answers.0);
-        bvh.intersect_batch(rays, &mut answers.1);
+        bvh.batch(rays).occluded_into(&mut answers.0);
+        bvh.batch(rays).intersect_into(&mut answers.1);
         for (index, ray) in rays.iter().enumerate() {
             assert_eq!(answers.0[index], brute.occluded(ray), "{count}: {ray:?}");
             assert_eq!(
@@ -362,7 +362,7 @@ fn batches_of_every_length() {
         }
     }
     let mut whole = vec![None; rays.len()];
-    bvh.intersect_batch(&rays, &mut whole);
+    bvh.batch(&rays).intersect_into(&mut whole);
     for (ray, hit) in rays.iter().zip(&whole) {
         assert_eq!(bits(bvh.intersect(ray)), bits(*hit), "{ray:?}");
     }
@@ -486,7 +486,7 @@ fn closed_objects_do_not_leak() {
                 })
                 .collect();
             let mut occluded = vec![false; rays.len()];
-            bvh.occluded_batch(&rays, &mut occluded);
+            bvh.batch(&rays).occluded_into(&mut occluded);
             for (ray, occluded) in rays.iter().zip(occluded) {
                 assert!(occluded, "seed {seed} x{width} {instance:?} {ray:?}");
             }

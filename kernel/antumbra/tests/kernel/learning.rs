@@ -67,8 +67,8 @@ fn learned_trees_equal_brute_force() {
             bvh.validate()
                 .unwrap_or_else(|broken| panic!("{place}: {broken}"));
             let mut found = (vec![false; rays.len()], vec![None; rays.len()]);
-            bvh.occluded_batch(&rays, &mut found.0);
-            bvh.intersect_batch(&rays, &mut found.1);
+            bvh.batch(&rays).occluded_into(&mut found.0);
+            bvh.batch(&rays).intersect_into(&mut found.1);
             assert!(found == expected, "{place}");
             for order in [Order::Sato, Order::Embree, BY_RAY] {
                 let plan = bvh.plan(order, None, &learning.model).expect("no log");
@@ -76,7 +76,7 @@ fn learned_trees_equal_brute_force() {
                 bvh.apply(&plan);
                 bvh.validate().expect("a valid tree");
                 let mut found = vec![false; rays.len()];
-                bvh.occluded_batch(&rays, &mut found);
+                bvh.batch(&rays).occluded_into(&mut found);
                 assert!(found == expected.0, "{place} {order}");
             }
         }

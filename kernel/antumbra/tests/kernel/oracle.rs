@@ -165,7 +165,7 @@ fn needles_near_the_end_of_an_interval_are_exact() {
         for isa in Isa::available() {
             bvh.set_isa(isa);
             let mut found = vec![false; rays.len()];
-            bvh.occluded_batch(&rays, &mut found);
+            bvh.batch(&rays).occluded_into(&mut found);
             for (index, ray) in rays.iter().enumerate() {
                 assert_eq!(
                     found[index],

@@ -334,8 +334,8 @@ fn empty_slots_stay_behind_the_others() {
         bvh.validate().expect("slots are permuted and no more");
         assert_ne!(bvh.to_bytes(), built.to_bytes());
         let (mut before, mut after) = (vec![false; rays.len()], vec![false; rays.len()]);
-        built.occluded_batch(&rays, &mut before);
-        bvh.occluded_batch(&rays, &mut after);
+        built.batch(&rays).occluded_into(&mut before);
+        bvh.batch(&rays).occluded_into(&mut after);
         assert_eq!(before, after, "x{width}");
     }
 }

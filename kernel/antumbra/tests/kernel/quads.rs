@@ -78,7 +78,7 @@ proptest! {
         for_every_tree(&quads, &rays, |bvh, tree| {
             let place = format!("seed {seed}, {tree}");
             let mut hits = vec![None; rays.len()];
-            bvh.intersect_batch(&rays, &mut hits);
+            bvh.batch(&rays).intersect_into(&mut hits);
             for (ray, hit) in rays.iter().zip(hits) {
                 let expected = brute.intersect(ray).map(on_quad);
                 assert_eq!(bits(hit), bits(expected), "{place}");
@@ -198,7 +198,7 @@ fn quads_are_watertight() {
         ));
     }
     let mut occluded = vec![false; rays.len()];
-    bvh.occluded_batch(&rays, &mut occluded);
+    bvh.batch(&rays).occluded_into(&mut occluded);
     for (ray, occluded) in rays.iter().zip(occluded) {
         assert!(occluded && brute.occluded(ray), "{ray:?}");
     }

@@ -39,8 +39,8 @@ fn threads_share_a_tree() {
         let bvh = Arc::new(bvh);
         let mut occluded = vec![false; rays.len()];
         let mut hits = vec![None; rays.len()];
-        bvh.occluded_batch(&rays, &mut occluded);
-        bvh.intersect_batch(&rays, &mut hits);
+        bvh.batch(&rays).occluded_into(&mut occluded);
+        bvh.batch(&rays).intersect_into(&mut hits);
         let (rays, answers) = (Arc::new(rays), Arc::new((occluded, hits)));
         let threads: Vec<_> = (0..4)
             .map(|_| {
@@ -287,8 +287,8 @@ fn columns_give_the_answers_of_lists() {
             let (mut occluded, mut found) = (vec![true; len], vec![false; len]);
             let (mut hits, mut found_hits) = (vec![None; len], vec![None; len]);
             let mut words = vec![u64::MAX; len.div_ceil(64)];
-            bvh.occluded_batch(&list, &mut occluded);
-            bvh.intersect_batch(&list, &mut hits);
+            bvh.batch(&list).occluded_into(&mut occluded);
+            bvh.batch(&list).intersect_into(&mut hits);
             for order in [RayOrder::AsGiven, RayOrder::Sorted, RayOrder::ByRule] {
                 bvh.batch(columns).order(order).occluded_into(&mut found);
                 assert_eq!(found, occluded, "{len} {order:?}");
@@ -304,7 +304,7 @@ fn columns_give_the_answers_of_lists() {
                 }
             }
             let closed: Vec<Ray> = list.iter().map(|ray| ray.closed()).collect();
-            bvh.intersect_batch(&closed, &mut hits);
+            bvh.batch(&closed).intersect_into(&mut hits);
             for order in [RayOrder::AsGiven, RayOrder::Sorted] {
                 bvh.batch(columns)
                     .closed()
@@ -361,8 +361,8 @@ fn sorted_batches_give_the_same_answers_in_the_same_places() {
             let rays = &rays[..len];
             let (mut occluded, mut found) = (vec![false; len], vec![true; len]);
             let (mut hits, mut found_hits) = (vec![None; len], vec![None; len]);
-            bvh.occluded_batch(rays, &mut occluded);
-            bvh.intersect_batch(rays, &mut hits);
+            bvh.batch(rays).occluded_into(&mut occluded);
+            bvh.batch(rays).intersect_into(&mut hits);
             for threads in [1, 3] {
                 pool(threads).install(|| {
                     bvh.batch(rays)
@@ -452,7 +452,8 @@ fn batches_stay_in_the_pool_of_their_caller() {
             .eq([thread::current().id()])
     );
     // Few rays stay on the thread, whatever pool there is.
-    bvh.occluded_batch(&rays[..16_384], &mut occluded[..16_384]);
+    bvh.batch(&rays[..16_384])
+        .occluded_into(&mut occluded[..16_384]);
     assert!(
         seen()
             .iter()

@@ -29,8 +29,8 @@ fn check(bvh: &Bvh, geometries: &[Geometry<'_>], rays: &[antumbra::Ray], place: 
     let brute = brute(geometries);
     let mut occluded = vec![false; rays.len()];
     let mut hits = vec![None; rays.len()];
-    bvh.occluded_batch(rays, &mut occluded);
-    bvh.intersect_batch(rays, &mut hits);
+    bvh.batch(rays).occluded_into(&mut occluded);
+    bvh.batch(rays).intersect_into(&mut hits);
     for (index, ray) in rays.iter().enumerate() {
         let hit = brute.intersect(ray);
         assert_eq!(occluded[index], hit.is_some(), "{place}: {ray:?}");
@@ -134,7 +134,7 @@ fn large_trees_refit_in_pieces() {
     let rays = kernel_rays(&rays::around(&mut rng, &after, 20_000));
     let hits = |bvh: &Bvh| {
         let mut hits = vec![None; rays.len()];
-        bvh.intersect_batch(&rays, &mut hits);
+        bvh.batch(&rays).intersect_into(&mut hits);
         hits.into_iter().map(bits).collect::<Vec<_>>()
     };
     assert_eq!(hits(&bvh), hits(&rebuilt));

@@ -256,8 +256,8 @@ pub fn equals_brute_by(
         .unwrap_or_else(|broken| panic!("{name}: {broken}"));
     let mut occluded = vec![false; rays.len()];
     let mut hits = vec![None; rays.len()];
-    bvh.occluded_batch(rays, &mut occluded);
-    bvh.intersect_batch(rays, &mut hits);
+    bvh.batch(rays).occluded_into(&mut occluded);
+    bvh.batch(rays).intersect_into(&mut hits);
     for (index, ray) in rays.iter().enumerate() {
         let place = || format!("{name}: {ray:?}");
         assert_eq!(occluded[index], brute.occluded(ray), "{}", place());
@@ -286,8 +286,8 @@ pub fn equals_brute(name: &str, primitives: &Primitives, rays: &[Ray]) {
             .unwrap_or_else(|broken| panic!("{name}, {tree}: {broken}"));
         let mut found_occluded = vec![false; rays.len()];
         let mut found_hits = vec![None; rays.len()];
-        bvh.occluded_batch(rays, &mut found_occluded);
-        bvh.intersect_batch(rays, &mut found_hits);
+        bvh.batch(rays).occluded_into(&mut found_occluded);
+        bvh.batch(rays).intersect_into(&mut found_hits);
         for (index, ray) in rays.iter().enumerate() {
             let place = || format!("{name}, {tree}, ray {index}: {ray:?}");
             assert_eq!(found_occluded[index], occluded[index], "{}", place());

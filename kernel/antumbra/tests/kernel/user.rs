@@ -276,8 +276,8 @@ fn lies_do_no_harm() {
         for round in 0..3 {
             let mut hits = vec![None; rays.len()];
             let mut occluded = vec![false; rays.len()];
-            bvh.intersect_batch(&rays, &mut hits);
-            bvh.occluded_batch(&rays, &mut occluded);
+            bvh.batch(&rays).intersect_into(&mut hits);
+            bvh.batch(&rays).occluded_into(&mut occluded);
             for (ray, hit) in rays.iter().zip(hits) {
                 let hits = bvh.query(ray).all_hits().into_iter().chain(hit);
                 for hit in hits {

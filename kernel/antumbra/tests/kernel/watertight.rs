@@ -59,7 +59,7 @@ fn rays_at_edges_and_corners_do_not_leak() {
             let rays: Vec<_> = (0..BATCH)
                 .map(|_| aim(&mut rng, mesh, center, *room))
                 .collect();
-            bvh.occluded_batch(&rays, &mut occluded);
+            bvh.batch(&rays).occluded_into(&mut occluded);
             traced += BATCH;
             for (ray, occluded) in rays.iter().zip(&occluded) {
                 assert!(
@@ -210,8 +210,8 @@ fn all_hit(
     let name = format!("{name}, {builder} x{width} {}", isa.level());
     let mut occluded = vec![false; BATCH];
     let mut hits = vec![None; BATCH];
-    bvh.occluded_batch(&rays, &mut occluded);
-    bvh.intersect_batch(&rays, &mut hits);
+    bvh.batch(&rays).occluded_into(&mut occluded);
+    bvh.batch(&rays).intersect_into(&mut hits);
     for (index, ray) in rays.iter().enumerate() {
         assert!(occluded[index] && bvh.occluded(ray), "{name}: {ray:?}");
         assert_eq!(hits[index], found[index], "{name}: {ray:?}");

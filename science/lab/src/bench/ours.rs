@@ -131,7 +131,7 @@ impl Work for Occlusion<'_> {
                     *answer = self.bvh.occluded(ray);
                 }
             }
-            Api::Batch => self.bvh.occluded_batch(self.rays, &mut self.answers),
+            Api::Batch => self.bvh.batch(self.rays).occluded_into(&mut self.answers),
         }
     }
 
@@ -159,7 +159,7 @@ impl Work for Closest<'_> {
                     *answer = self.bvh.intersect(ray);
                 }
             }
-            Api::Batch => self.bvh.intersect_batch(self.rays, &mut self.answers),
+            Api::Batch => self.bvh.batch(self.rays).intersect_into(&mut self.answers),
         }
     }
 

@@ -267,7 +267,7 @@ impl Reference {
     fn new(world: &World, kind: Kind, width: Width, isa: Isa, rays: &[Ray]) -> Self {
         let bvh = world.bvh(width, isa);
         let mut answers = vec![false; rays.len()];
-        bvh.occluded_batch(rays, &mut answers);
+        bvh.batch(rays).occluded_into(&mut answers);
         Self {
             kind,
             width,

@@ -48,7 +48,7 @@ fn all_lots_together_are_the_rays_of_the_rendering() {
     assert_eq!(found, stats.shadow_rays);
     let occluded = |rays: &[Ray]| {
         let mut answers = vec![false; rays.len()];
-        bvh.occluded_batch(rays, &mut answers);
+        bvh.batch(rays).occluded_into(&mut answers);
         answers.iter().filter(|answer| **answer).count() as u64
     };
     let all = SampledRays::new(&world, &bvh, SPP, 7).take(usize::MAX, 0);
@@ -126,7 +126,7 @@ fn every_combination_answers_alike_and_predicts_a_cost() {
     let log = samples.take(500, 0);
     let test = samples.take(2000, 0).shadow;
     let mut expected = vec![false; test.len()];
-    bvh.occluded_batch(&test, &mut expected);
+    bvh.batch(&test).occluded_into(&mut expected);
     let recipe = Recipe::default().seed(5);
     let kinds = pairs(0, &BUILDERS, &RaysFrom::ALL);
     for ((builder, from), collapse, order) in triples(0, &kinds, &COLLAPSES, &ORDERS) {
@@ -137,7 +137,7 @@ fn every_combination_answers_alike_and_predicts_a_cost() {
         let ordered = collapsed.order(order).expect("an order");
         ordered.bvh.validate().expect("a sound tree");
         let mut answers = vec![false; test.len()];
-        ordered.bvh.occluded_batch(&test, &mut answers);
+        ordered.bvh.batch(&test).occluded_into(&mut answers);
         assert!(answers == expected, "{builder} {collapse} {order}");
         if let Some([before, after]) = ordered.predicted {
             assert!(before >= 1.0 && after >= 1.0 && after.is_finite());

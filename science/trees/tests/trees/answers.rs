@@ -75,8 +75,8 @@ fn check(name: &str, primitives: &Primitives, rays: &[Ray], turns: &mut Turns) {
             bvh.validate()
                 .unwrap_or_else(|broken| panic!("{name}, {tree}: {broken}"));
             let mut found = (vec![false; rays.len()], vec![None; rays.len()]);
-            bvh.occluded_batch(rays, &mut found.0);
-            bvh.intersect_batch(rays, &mut found.1);
+            bvh.batch(rays).occluded_into(&mut found.0);
+            bvh.batch(rays).intersect_into(&mut found.1);
             for (index, ray) in rays.iter().enumerate() {
                 let place = || format!("{name}, {tree}, ray {index}: {ray:?}");
                 assert_eq!(found.0[index], occluded[index], "{}", place());

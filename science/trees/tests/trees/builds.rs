@@ -116,7 +116,7 @@ fn small_leaves_hold_everything() {
     };
     let answers = |bvh: &Bvh| {
         let mut occluded = vec![false; rays.len()];
-        bvh.occluded_batch(&rays, &mut occluded);
+        bvh.batch(&rays).occluded_into(&mut occluded);
         occluded
     };
     let (large, small) = (build(Builder::BinnedSah), build(PBRT));

@@ -66,10 +66,8 @@ fn flat_boxes_first_changes_no_answer() {
     let rays: Vec<Ray> = (0..2000)
         .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
         .collect();
-    let (mut before, mut after) = (vec![false; rays.len()], vec![false; rays.len()]);
-    built.occluded_batch(&rays, &mut before);
-    ordered.occluded_batch(&rays, &mut after);
-    assert_eq!(before, after);
+    let before = built.batch(&rays).occluded();
+    assert_eq!(ordered.batch(&rays).occluded(), before);
     assert!(before.contains(&true) && before.contains(&false));
 }
 // ANCHOR_END: test

@@ -187,8 +187,8 @@ fn forged(rng: &mut Rng, file: &[u8]) -> Vec<u8> {
 fn ask(bvh: &Bvh, rays: &[Ray]) {
     let mut occluded = vec![false; rays.len()];
     let mut hits = vec![None; rays.len()];
-    bvh.occluded_batch(rays, &mut occluded);
-    bvh.intersect_batch(rays, &mut hits);
+    bvh.batch(rays).occluded_into(&mut occluded);
+    bvh.batch(rays).intersect_into(&mut hits);
     for (ray, hit) in rays.iter().zip(&hits) {
         assert_eq!(bits(bvh.intersect(ray)), bits(*hit));
         let _ = hit.map(|hit| bvh.normal(ray, &hit));

@@ -245,7 +245,7 @@ fn saved_trees_answer_as_built_ones_at_the_same_cost() {
                 for isa in Isa::available() {
                     read.set_isa(isa);
                     let mut occluded = vec![false; rays.len()];
-                    read.occluded_batch(rays, &mut occluded);
+                    read.batch(rays).occluded_into(&mut occluded);
                     for (ray, occluded) in rays.iter().zip(occluded) {
                         assert_eq!(occluded, brute.occluded(ray));
                         assert_eq!(read.occluded(ray), occluded);
@@ -284,7 +284,7 @@ fn loaded_worlds_move_like_the_original() {
             let all = Primitives::with_instances(&scene.ground(), &scene.objects(), instances);
             let brute = Brute::new(&all.expect("in range"));
             let mut hits = vec![None; scene.rays.len()];
-            loaded.bvh().intersect_batch(&scene.rays, &mut hits);
+            loaded.bvh().batch(&scene.rays).intersect_into(&mut hits);
             for (ray, hit) in scene.rays.iter().zip(hits) {
                 assert_eq!(bits(hit), bits(brute.intersect(ray)), "x{width}");
                 assert_eq!(bits(hit), bits(world.bvh().intersect(ray)), "x{width}");
