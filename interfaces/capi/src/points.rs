@@ -188,7 +188,7 @@ query!(
     "Finds the nearest primitive of each point.",
     "closest": Option<antumbra::ClosestPoint>,
     Near,
-    |bvh, points, limits, found| bvh.closest_batch(points, limits, found),
+    |bvh, points, limits, found| bvh.points(points).within(limits).closest_into(found),
     |found| found.map_or(Near::NOTHING, Near::from)
 );
 query!(
@@ -196,7 +196,7 @@ query!(
     "Returns for each point whether it is inside.",
     "inside": bool,
     u8,
-    |bvh, points, _, found| bvh.contains_batch(points, found),
+    |bvh, points, _, found| bvh.points(points).inside_into(found),
     |found| u8::from(*found)
 );
 query!(
@@ -204,7 +204,7 @@ query!(
     "Returns the distance of each point, negative inside.",
     "distances": f32,
     f32,
-    |bvh, points, _, found| bvh.signed_distance_batch(points, found),
+    |bvh, points, _, found| bvh.points(points).signed_distances_into(found),
     |found| *found
 );
 query!(

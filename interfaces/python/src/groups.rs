@@ -10,7 +10,7 @@
 //! origin offset need no second look. The bound holds for triangles that no instance places: their `t` does not depend on the
 //! interval.
 
-use antumbra::{Aabb, Directions, Distance, Ray};
+use antumbra::{Aabb, Directions, Ray};
 use antumbra_bake::along_curve;
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -140,7 +140,7 @@ impl RayGroup {
         };
         let limits = memory::collected(points.iter().map(limit), points.len(), "distances")?;
         let mut near = memory::filled(None, points.len(), "answers")?;
-        bvh.closest_batch(points, Distance::from(&limits[..]), &mut near);
+        bvh.points(points).within(&limits).closest_into(&mut near);
         let words = open.len() / points.len();
         let (mut columns, mut rays, mut hits) = (Vec::new(), Vec::new(), Vec::new());
         for (row, _) in near.iter().enumerate().filter(|(_, near)| near.is_some()) {

@@ -27,7 +27,7 @@ pub fn contains(
     let mut inside = memory::filled(false, points.len(), "answers")?;
     call.in_pieces(py, points.len(), PIECE, |range, threads| {
         let (points, inside) = (&points[range.clone()], &mut inside[range]);
-        py.detach(|| threads.run(|| scene.bvh().contains_batch(points, inside)));
+        py.detach(|| threads.run(|| scene.bvh().points(points).inside_into(inside)));
         Ok(())
     })?;
     Ok(inside)
@@ -44,7 +44,7 @@ pub fn signed_distances(
     let mut distances = memory::filled(f32::INFINITY, points.len(), "distances")?;
     call.in_pieces(py, points.len(), PIECE, |range, threads| {
         let (points, distances) = (&points[range.clone()], &mut distances[range]);
-        py.detach(|| threads.run(|| scene.bvh().signed_distance_batch(points, distances)));
+        py.detach(|| threads.run(|| scene.bvh().points(points).signed_distances_into(distances)));
         Ok(())
     })?;
     Ok(distances)
@@ -180,7 +180,7 @@ pub fn closest<'py>(
             [one] => Distance::Same(*one),
             each => Distance::from(&each[range]),
         };
-        py.detach(|| threads.run(|| bvh.closest_batch(points, limit, found)));
+        py.detach(|| threads.run(|| bvh.points(points).within(limit).closest_into(found)));
         Ok(())
     })?;
     let mut columns = Columns::missed(points.len())?;

@@ -124,7 +124,7 @@ pub use api::child_order::ChildOrder;
 pub use api::group::{Directions, Group};
 pub use api::hit_lists::HitLists;
 pub use api::object::Object;
-pub use api::points::ClosestPoint;
+pub use api::points::{ClosestPoint, Points};
 pub use api::ray_memory::RayMemory;
 pub use api::ray_order::RayOrder;
 pub use api::ray_query::RayQuery;

@@ -278,10 +278,10 @@ impl<'a> Questions<'a> {
         let mut signed = vec![0.0; points.len()];
         for way in ["batch", "single"] {
             if way == "batch" {
-                bvh.closest_batch(points, f32::INFINITY, &mut nearest);
-                bvh.within_batch(points, REACH, &mut within);
-                bvh.contains_batch(points, &mut inside);
-                bvh.signed_distance_batch(points, &mut signed);
+                bvh.points(points).closest_into(&mut nearest);
+                within = bvh.points(points).within(REACH).all();
+                bvh.points(points).inside_into(&mut inside);
+                bvh.points(points).signed_distances_into(&mut signed);
             } else {
                 for (index, point) in points.iter().enumerate() {
                     nearest[index] = bvh.closest(*point, f32::INFINITY);

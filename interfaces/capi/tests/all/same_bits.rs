@@ -261,7 +261,5 @@ fn single_rays_groups_and_points_answer_as_the_kernel_does() {
         build::antumbra_bvh_free(tree);
     }
     assert_eq!(bits, open);
-    let mut distances = vec![0.0; places.len()];
-    bvh.signed_distance_batch(&places, &mut distances);
-    assert_eq!(near, distances);
+    assert_eq!(near, bvh.points(&places).signed_distances());
 }

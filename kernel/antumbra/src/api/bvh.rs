@@ -24,7 +24,7 @@ use crate::tree::width::Width;
 /// | build | [`Bvh::build`], [`Bvh::learn`], and [`Build`](crate::Build) for every choice |
 /// | trace one ray | [`Bvh::occluded`], [`Bvh::intersect`], and [`Bvh::query`] for conditions and all hits |
 /// | trace many rays | [`Bvh::batch`], and [`Bvh::group`] for many points in the same directions |
-/// | look around points | [`Bvh::closest`], [`Bvh::within`], [`Bvh::contains`], [`Bvh::signed_distance`], [`Bvh::winding_number`] |
+/// | look around points | [`Bvh::closest`], [`Bvh::within`], [`Bvh::contains`], [`Bvh::signed_distance`], [`Bvh::winding_number`], and [`Bvh::points`] for many |
 /// | follow what moves | [`Bvh::refit`], [`Bvh::relearn`], and [`World`](crate::World) for instances |
 /// | motion blur | [`Geometry::moving`](crate::Geometry::moving), [`RayQuery::at`](crate::RayQuery::at), [`Batch::at`](crate::Batch::at) |
 /// | save and load | [`Bvh::write`], [`Bvh::read`], [`Bvh::to_bytes`], [`Bvh::from_bytes`] |

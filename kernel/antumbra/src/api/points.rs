@@ -1,5 +1,6 @@
 //! Queries about points: what is nearest, what is within a distance, what is inside, and how deep.
 
+use alloc::vec;
 use alloc::vec::Vec;
 
 use antumbra_simd::Dispatch;
@@ -80,14 +81,24 @@ impl ClosestPoint {
 /// Distances are measured to surfaces: a point inside a sphere or a closed mesh is as far away as the surface is.
 /// Instances are measured in the world, whatever their transforms: corners are placed first, and spheres become
 /// ellipsoids. Distances are computed and compared in double precision. The `f32` returned is the distance rounded
-/// once. So answers are the same bits for every tree, one by one and in batches. Partly transparent triangles count as
+/// once. So answers are the same bits for every tree, one by one and together. Partly transparent triangles count as
 /// if they were opaque. A quad is nearest where the nearer of its two triangles is, and counts once.
 ///
 /// [User geometry](crate::UserGeometry) answers by [`UserGeometry::closest_point`](crate::UserGeometry::closest_point).
 /// Queries for distances panic when they come to a primitive without it. No point is inside user geometry.
 ///
-/// Neighbours in a batch share work: points of a grid, a curve or a surface are fastest in that order.
+/// Neighbours among many points share work: points of a grid, a curve or a surface are fastest in that order.
 impl Bvh {
+    /// Points that are queried together: see [`Points`]. Shared among the threads of the current rayon pool, if the `parallel`
+    /// feature is on.
+    pub fn points<'a>(&'a self, points: &'a [[f32; 3]]) -> Points<'a> {
+        Points {
+            bvh: self,
+            points,
+            limits: Distance::Same(f32::INFINITY),
+        }
+    }
+
     /// The nearest primitive, if its distance is at most `max_distance`, which may be infinite. `None` for a point with a
     /// NaN or infinite coordinate, and for a distance that is NaN or negative.
     ///
@@ -113,37 +124,6 @@ impl Bvh {
         found.as_ref().map(ClosestPoint::new)
     }
 
-    /// [`Bvh::closest`] of many points: `closest[i]` answers `points[i]`. One `max_distance` for all of them, or one for each.
-    /// Shared among the threads of the current rayon pool, if the `parallel` feature is on.
-    ///
-    /// ```
-    /// # use antumbra::{Bvh, Geometry, Recipe};
-    /// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
-    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
-    /// let points = [[0.25, 0.25, 3.0], [0.25, 0.25, -2.0]];
-    /// let mut closest = [None; 2];
-    /// bvh.closest_batch(&points, f32::INFINITY, &mut closest);
-    /// assert_eq!(closest.map(|near| near.map(|near| near.distance)), [Some(3.0), Some(2.0)]);
-    /// bvh.closest_batch(&points, &[1.0, 2.0][..], &mut closest);
-    /// assert_eq!(closest.map(|near| near.map(|near| near.distance)), [None, Some(2.0)]);
-    /// # Ok::<(), antumbra::Error>(())
-    /// ```
-    ///
-    /// # Panics
-    /// If the slices differ in length, if there are fewer distances than points, and as [`Bvh::closest`].
-    pub fn closest_batch<'a>(
-        &self,
-        points: &[[f32; 3]],
-        max_distance: impl Into<Distance<'a>>,
-        closest: &mut [Option<ClosestPoint>],
-    ) {
-        let limits = checked(max_distance.into(), points);
-        self.closest_each(points, limits, closest, |_, found| {
-            found.map(ClosestPoint::new)
-        });
-    }
-
     /// All primitives at a distance of at most `radius`, each once, the nearest first and at equal distances by (inst_id,
     /// geom_id, prim_id). Empty for a point with a NaN or infinite coordinate, and for a radius that is NaN or negative.
     ///
@@ -165,23 +145,6 @@ impl Bvh {
         within_by(point, radius, |within| {
             self.pool.with(|memory| self.seek(memory, point, within));
         })
-    }
-
-    /// [`Bvh::within`] of many points: `found[i]` answers `points[i]`. One radius for all of them, or one for each. Shared
-    /// among threads as in [`Bvh::closest_batch`].
-    ///
-    /// # Panics
-    /// As [`Bvh::closest_batch`].
-    pub fn within_batch<'a>(
-        &self,
-        points: &[[f32; 3]],
-        radius: impl Into<Distance<'a>>,
-        found: &mut [Vec<ClosestPoint>],
-    ) {
-        let radii = checked(radius.into(), points);
-        each(points, found, |index, point| {
-            self.within(point, radii.get(index))
-        });
     }
 
     /// Distance of the nearest surface, negative for points that [`Bvh::contains`] finds inside. 0 on a surface. Infinite if
@@ -211,20 +174,6 @@ impl Bvh {
         })
     }
 
-    /// [`Bvh::signed_distance`] of many points: `distances[i]` answers `points[i]`. Shared among threads as in
-    /// [`Bvh::closest_batch`].
-    ///
-    /// # Panics
-    /// If the slices differ in length, and as [`Bvh::closest`].
-    pub fn signed_distance_batch(&self, points: &[[f32; 3]], distances: &mut [f32]) {
-        let limit = Distance::Same(f32::INFINITY);
-        self.closest_each(points, limit, distances, |point, found| {
-            signed(point, found.map(Candidate::distance), |point| {
-                self.contains(point)
-            })
-        });
-    }
-
     /// Whether a point lies in a sphere or in a closed mesh, in the world or in an instance: whether a half-line from the
     /// point crosses some geometry an odd number of times. False for a point with a NaN or infinite coordinate.
     ///
@@ -245,15 +194,6 @@ impl Bvh {
     #[must_use]
     pub fn contains(&self, point: impl Into<[f32; 3]>) -> bool {
         self.around(point.into()).is_inside
-    }
-
-    /// [`Bvh::contains`] of many points: `inside[i]` answers `points[i]`. Shared among threads as in
-    /// [`Bvh::closest_batch`].
-    ///
-    /// # Panics
-    /// If the slices differ in length.
-    pub fn contains_batch(&self, points: &[[f32; 3]], inside: &mut [bool]) {
-        each(points, inside, |_, point| self.contains(point));
     }
 
     /// How often closed meshes and spheres go around a point, in the world and in instances: 1 in a mesh whose triangles
@@ -280,23 +220,132 @@ impl Bvh {
     fn seek(&self, memory: &mut Memory, point: [f32; 3], seeker: &mut dyn Seeker) {
         on_tree!(&self.tree, tree => self.isa.dispatch(Search { tree, point, memory, seeker }));
     }
+}
+
+/// Many points of one query. Made by [`Bvh::points`]; nothing happens before the last call, which names the query.
+///
+/// Item `i` answers point `i`, with the bits of the query of one point.
+///
+/// ```
+/// # use antumbra::{Bvh, Geometry, Recipe};
+/// # let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+/// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+/// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+/// let points = [[0.25, 0.25, 3.0], [0.25, 0.25, -2.0]];
+/// let distance = |near: Option<antumbra::ClosestPoint>| near.map(|near| near.distance);
+/// let closest = bvh.points(&points).closest();
+/// assert_eq!([0, 1].map(|point| distance(closest[point])), [Some(3.0), Some(2.0)]);
+/// let closest = bvh.points(&points).within(&[1.0, 2.0][..]).closest();
+/// assert_eq!([0, 1].map(|point| distance(closest[point])), [None, Some(2.0)]);
+/// # Ok::<(), antumbra::Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+#[must_use = "points do nothing until the last call"]
+pub struct Points<'a> {
+    bvh: &'a Bvh,
+    points: &'a [[f32; 3]],
+    limits: Distance<'a>,
+}
+
+impl<'a> Points<'a> {
+    /// Looks no farther than this: one distance for all points, or one for each. Without a call, at any distance. Counts for
+    /// [`Points::closest`] and [`Points::all`]; [`Points::inside`] and [`Points::signed_distances`] have no limit.
+    ///
+    /// # Panics
+    /// If there are fewer distances than points.
+    pub fn within(self, distances: impl Into<Distance<'a>>) -> Self {
+        let limits = distances.into();
+        let checked = limits.check("distances", self.points.len());
+        assert!(checked.is_ok(), "one distance per point");
+        Self { limits, ..self }
+    }
+
+    /// [`Bvh::closest`] of each point.
+    ///
+    /// # Panics
+    /// As [`Bvh::closest`].
+    #[must_use]
+    pub fn closest(self) -> Vec<Option<ClosestPoint>> {
+        let mut closest = vec![None; self.points.len()];
+        self.closest_into(&mut closest);
+        closest
+    }
+
+    /// [`Points::closest`] into a slice.
+    ///
+    /// # Panics
+    /// If there are not as many answers as points, and as [`Bvh::closest`].
+    pub fn closest_into(self, closest: &mut [Option<ClosestPoint>]) {
+        self.closest_each(closest, |_, found| found.map(ClosestPoint::new));
+    }
+
+    /// [`Bvh::within`] of each point: all primitives that are near enough.
+    ///
+    /// # Panics
+    /// As [`Bvh::closest`].
+    #[must_use]
+    pub fn all(self) -> Vec<Vec<ClosestPoint>> {
+        let mut found = vec![Vec::new(); self.points.len()];
+        each(self.points, &mut found, |index, point| {
+            self.bvh.within(point, self.limits.get(index))
+        });
+        found
+    }
+
+    /// [`Bvh::contains`] of each point.
+    #[must_use]
+    pub fn inside(self) -> Vec<bool> {
+        let mut inside = vec![false; self.points.len()];
+        self.inside_into(&mut inside);
+        inside
+    }
+
+    /// [`Points::inside`] into a slice.
+    ///
+    /// # Panics
+    /// If there are not as many answers as points.
+    pub fn inside_into(self, inside: &mut [bool]) {
+        each(self.points, inside, |_, point| self.bvh.contains(point));
+    }
+
+    /// [`Bvh::signed_distance`] of each point.
+    ///
+    /// # Panics
+    /// As [`Bvh::closest`].
+    #[must_use]
+    pub fn signed_distances(self) -> Vec<f32> {
+        let mut distances = vec![0.0; self.points.len()];
+        self.signed_distances_into(&mut distances);
+        distances
+    }
+
+    /// [`Points::signed_distances`] into a slice.
+    ///
+    /// # Panics
+    /// If there are not as many answers as points, and as [`Bvh::closest`].
+    pub fn signed_distances_into(self, distances: &mut [f32]) {
+        let (bvh, limits) = (self.bvh, Distance::Same(f32::INFINITY));
+        Self { limits, ..self }.closest_each(distances, |point, found| {
+            signed(point, found.map(Candidate::distance), |point| {
+                bvh.contains(point)
+            })
+        });
+    }
 
     /// Answers every point by the primitive nearest to it. One thread takes neighbours one after the other, and guesses
     /// that the distance changes little from one point to the next.
     fn closest_each<A: Send>(
-        &self,
-        points: &[[f32; 3]],
-        limits: Distance<'_>,
+        self,
         answers: &mut [A],
         answer: impl Fn([f32; 3], Option<&Candidate>) -> A + Sync + Send,
     ) {
-        in_chunks(points, answers, |first, points, answers| {
-            self.pool.with(|memory| {
+        in_chunks(self.points, answers, |first, points, answers| {
+            self.bvh.pool.with(|memory| {
                 let mut last = None;
                 for (index, (&point, slot)) in points.iter().zip(answers).enumerate() {
-                    let limit = limits.get(first + index);
+                    let limit = self.limits.get(first + index);
                     let found = closest_by(point, limit, last, |nearest| {
-                        self.seek(memory, point, nearest);
+                        self.bvh.seek(memory, point, nearest);
                     });
                     *slot = answer(point, found.as_ref());
                     if let Some(found) = found {
@@ -401,13 +450,6 @@ fn signed(point: [f32; 3], distance: Option<f32>, contains: impl FnOnce([f32; 3]
         None if is_finite(point) => f32::INFINITY,
         None => f32::NAN,
     }
-}
-
-/// Distances of points, if there are enough.
-fn checked<'a>(distances: Distance<'a>, points: &[[f32; 3]]) -> Distance<'a> {
-    let checked = distances.check("distances", points.len());
-    assert!(checked.is_ok(), "one distance per point");
-    distances
 }
 
 fn within_by(point: [f32; 3], radius: f32, seek: impl FnOnce(&mut Within)) -> Vec<ClosestPoint> {

@@ -59,19 +59,16 @@ fn check(bvh: &Bvh, brute: &Brute, points: &[[f32; 3]], rng: &mut Rng, place: &s
     };
     let limits = each([f32::INFINITY, 1.0, 0.05, 0.0, f32::NAN]);
     let radii = each([1.0, 0.1, 8.0, 0.0, -1.0]);
-    let mut closest = vec![None; points.len()];
-    let mut within = vec![Vec::new(); points.len()];
-    let mut inside = vec![false; points.len()];
-    let mut signed = vec![0.0; points.len()];
-    if same == 0 {
-        bvh.closest_batch(points, f32::INFINITY, &mut closest);
-        bvh.within_batch(points, 1.0, &mut within);
+    let together = bvh.points(points);
+    let (closest, within) = if same == 0 {
+        (together.closest(), together.within(1.0).all())
     } else {
-        bvh.closest_batch(points, &limits, &mut closest);
-        bvh.within_batch(points, &radii, &mut within);
-    }
-    bvh.contains_batch(points, &mut inside);
-    bvh.signed_distance_batch(points, &mut signed);
+        let closest = together.within(&limits).closest();
+        (closest, together.within(&radii).all())
+    };
+    // No limit counts for these.
+    let inside = together.within(&radii).inside();
+    let signed = together.within(&limits).signed_distances();
     for (index, &point) in points.iter().enumerate() {
         let (limit, radius) = (limits[index], radii[index]);
         let place = format!("{place}, {point:?}");
@@ -374,5 +371,5 @@ fn no_size_and_no_shape_is_missed() {
 #[should_panic(expected = "one distance per point")]
 fn too_few_distances_are_refused() {
     let bvh = Bvh::build(&[], &Recipe::default()).expect("nothing is fine");
-    bvh.closest_batch(&[[0.0; 3]; 2], &[1.0][..], &mut [None; 2]);
+    let _ = bvh.points(&[[0.0; 3]; 2]).within(&[1.0][..]).closest();
 }

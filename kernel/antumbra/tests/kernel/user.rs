@@ -348,12 +348,11 @@ fn wrong_guesses_of_a_batch_miss_nothing() {
     let primitives = Primitives::new(&list).expect("no indices");
     let brute = Brute::new(&primitives);
     for_every_tree(&primitives, &[], |bvh, tree| {
-        let mut closest = [None; 3];
-        bvh.closest_batch(&points, f32::INFINITY, &mut closest);
-        for (point, near) in points.into_iter().zip(closest) {
-            assert_eq!(near, brute.closest(point, f32::INFINITY), "{tree}");
+        let closest = bvh.points(&points).closest();
+        for (point, near) in points.into_iter().zip(&closest) {
+            assert_eq!(*near, brute.closest(point, f32::INFINITY), "{tree}");
         }
-        let ids = closest.map(|near| near.map(|near| (near.geom_id, near.prim_id)));
+        let ids = [0, 1, 2].map(|i| closest[i].map(|near| (near.geom_id, near.prim_id)));
         assert_eq!(ids, [Some((0, 0)), Some((0, 1)), Some((1, 0))], "{tree}");
     });
 }

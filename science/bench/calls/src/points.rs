@@ -57,7 +57,7 @@ pub fn run(name: &str, bvh: &Bvh, mesh: &Mesh, rounds: usize) {
             ),
             (
                 "closest_batch".into(),
-                Box::new(|| bvh.closest_batch(points, f32::INFINITY, &mut found.borrow_mut())),
+                Box::new(|| bvh.points(points).closest_into(&mut found.borrow_mut())),
             ),
         ];
         let names: Vec<String> = works.iter().map(|(name, _)| name.clone()).collect();

@@ -35,12 +35,10 @@ pub fn run(rtc: &Rtc, mesh: &Mesh, side: usize) -> Outcome {
         })
         .collect();
     let ours = |bvh: &Bvh| {
-        let mut closest = vec![None; points.len()];
-        bvh.closest_batch(&points, f32::INFINITY, &mut closest);
         let distance = |found: Option<antumbra::ClosestPoint>| {
             found.map_or(f32::INFINITY, |found| found.distance)
         };
-        closest.into_iter().map(distance).collect()
+        bvh.points(&points).closest().into_iter().map(distance).collect()
     };
     let embree =
         |is_bounded, share: usize| rtc.distances(mesh, &points[..points.len() / share], is_bounded);

@@ -62,7 +62,7 @@ pub fn measure(
                     }
                 }
                 1 => plan.pool.install(|| {
-                    tree.bvh.closest_batch(&points, f32::INFINITY, &mut closest);
+                    tree.bvh.points(&points).closest_into(&mut closest);
                 }),
                 _ => {
                     if let Some(scene) = &scene {
