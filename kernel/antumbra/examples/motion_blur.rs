@@ -4,7 +4,7 @@
 //!
 //! Prints how much of each place the things cover while the shutter is open.
 
-use antumbra::{Geometry, Instance, Ray, Recipe, Sphere, World};
+use antumbra::{Bvh, Geometry, Instance, Primitives, Ray, Recipe, Sphere};
 
 fn main() -> Result<(), antumbra::Error> {
     let door = |angle: f32| -> Vec<[f32; 3]> {
@@ -39,7 +39,8 @@ fn main() -> Result<(), antumbra::Error> {
     // ANCHOR: book
     let mesh = Geometry::moving([closed, open], door_indices);
     let rolling = Instance::moving(0, [at_start, at_end]);
-    let bvh = World::fixed(&[mesh], &[[ball]], &[rolling], &[], &Recipe::default())?;
+    let scene = Primitives::with_instances(&[mesh], &[[ball]], &[rolling])?;
+    let bvh = Bvh::build(&scene, &Recipe::default())?;
 
     let hits = bvh.batch(&rays).at(&times).intersect();
     // ANCHOR_END: book

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use antumbra::{Error, Geometry, Instance, Object, Ray, Recipe, World};
+use antumbra::{Bvh, Error, Geometry, Instance, Object, Primitives, Ray, Recipe, World};
 
 const INSTANCES: usize = 10_000;
 const RAYS: usize = 200_000;
@@ -99,7 +99,8 @@ fn main() -> Result<(), Error> {
 
     // The same scene built at once gives the same answers.
     let start = Instant::now();
-    let whole = World::fixed(&[], &[&geometry], &instances, &[], &Recipe::default())?;
+    let scene = Primitives::with_instances(&[], &[&geometry], &instances)?;
+    let whole = Bvh::build(&scene, &Recipe::default())?;
     let build = start.elapsed().as_secs_f64() * 1e3;
     let mut again = vec![false; rays.len()];
     let mut query = f64::INFINITY;

@@ -33,29 +33,30 @@
 //! - Tracing cannot fail; building returns errors.
 //!
 //! # Instances
-//! Objects are stored once and placed any number of times. A [`World`] places them:
+//! Objects are stored once and placed any number of times:
 //!
 //! | | made from | top level | moves |
 //! |---|---|---|---|
-//! | [`World::fixed`] | geometries | learned, together with the objects | no |
+//! | [`Bvh::build`] of [`Primitives::with_instances`] | geometries | learned, together with the objects | no |
 //! | [`World::new`], [`World::on_ground`] | finished [`Object`]s | built by areas, again whenever something moves | yes |
 //!
 //! ```
 //! # use antumbra::{Geometry, Ray, Recipe};
 //! # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
 //! # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
-//! use antumbra::{Instance, World};
+//! use antumbra::{Bvh, Instance, Primitives};
 //!
 //! let place = |x| Instance::new(0, [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
-//! let row = World::fixed(&[], &[geometry], &[place(0.0), place(5.0)], &[], &Recipe::default())?;
+//! let scene = Primitives::with_instances(&[], &[geometry], &[place(0.0), place(5.0)])?;
+//! let row = Bvh::build(&scene, &Recipe::default())?;
 //! let ray = Ray::new([5.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
 //! assert_eq!(row.intersect(&ray).map(|hit| hit.inst_id), Some(1));
 //! # Ok::<(), antumbra::Error>(())
 //! ```
 //!
 //! ## When the top level learns
-//! [`World::fixed`] follows training rays through the top level into the objects, so nodes and child orders of both levels
-//! suit the rays. A world that moves has objects that learned by themselves. [`World::relearn`] learns the child order of
+//! A tree of both levels follows training rays through the top level into the objects, so nodes and child orders of both
+//! suit the rays. A world has objects that learned by themselves. [`World::relearn`] learns the child order of
 //! its top level as well, until something moves. Answers are the same.
 //!
 //! # Scenes that change

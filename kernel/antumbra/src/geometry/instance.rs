@@ -15,13 +15,13 @@ use crate::words::{Sink, Words};
 /// objects that hold instances.
 ///
 /// ```
-/// use antumbra::{Geometry, Instance, Ray, Recipe, World};
+/// use antumbra::{Bvh, Geometry, Instance, Primitives, Ray, Recipe};
 ///
 /// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
 /// let leaf = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
 /// let mirrored = Instance::new(0, [[-1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
-/// let world = World::fixed(&[], &[leaf], &[mirrored], &[], &Recipe::default())?;
-/// assert!(world.occluded(&Ray::new([-0.2, 0.2, 0.0], [0.0, 0.0, 1.0])));
+/// let bvh = Bvh::build(&Primitives::with_instances(&[], &[leaf], &[mirrored])?, &Recipe::default())?;
+/// assert!(bvh.occluded(&Ray::new([-0.2, 0.2, 0.0], [0.0, 0.0, 1.0])));
 /// # Ok::<(), antumbra::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq)]

@@ -333,10 +333,11 @@ fn a_moving_square_covers_points_for_as_long_as_it_is_above_them() {
     let mesh = Geometry::moving([square(0.0), square(2.0)], indices.clone());
     let object = [Geometry::triangles(square(0.0), indices)];
     let instance = Instance::moving(0, [IDENTITY, translation([2.0, 0.0, 0.0])]);
+    let scene = Primitives::with_instances(&[], &[object], &[instance]).expect("sound");
     let recipe = Recipe::default();
     for bvh in [
         Bvh::build(&[mesh], &recipe).expect("sound"),
-        World::fixed(&[], &[object], &[instance], &[], &recipe).expect("sound"),
+        Bvh::build(&scene, &recipe).expect("sound"),
     ] {
         // More rays than one thread takes at a time.
         const COLUMNS: usize = 30;

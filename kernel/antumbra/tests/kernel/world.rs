@@ -228,7 +228,7 @@ fn objects_keep_their_filters() {
         .collect();
     let expected = Expected::new(&primitives, &rays, "stripess");
     expected.check(world.bvh(), &rays, "stripess");
-    let fixed = World::fixed(&[], &lists, &instances, &rays, &recipe).expect("in range");
+    let fixed = Bvh::learn(&primitives, &rays, &recipe).expect("in range");
     expected.check(&fixed, &rays, "fixed stripes");
     assert_eq!(world.bvh().report().cutouts, 6);
 }

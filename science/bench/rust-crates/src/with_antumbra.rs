@@ -1,6 +1,6 @@
 //! The three programs with `antumbra`.
 
-use antumbra::{Bvh, Geometry, Instance, Ray as KernelRay, Recipe, World};
+use antumbra::{Bvh, Geometry, Instance, Primitives, Ray as KernelRay, Recipe};
 
 use crate::input::{LIGHT, Mesh, Ray};
 use crate::{Answers, Timed};
@@ -57,8 +57,9 @@ pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Ti
             .iter()
             .map(|&transform| Instance::new(0, transform))
             .collect();
-        let world = World::fixed(&[], &[geometry], &places, &[], &Recipe::default());
-        world.expect("indices in range")
+        let scene = Primitives::with_instances(&[], &[geometry], &places);
+        let scene = scene.expect("indices in range");
+        Bvh::build(&scene, &Recipe::default()).expect("indices in range")
     });
     timed.trace(|| {
         let rays: Vec<KernelRay> = rays.iter().map(ray).collect();

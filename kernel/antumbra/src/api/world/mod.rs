@@ -19,10 +19,9 @@ use crate::error::Error;
 use crate::geometry::instance::{ObjectShape, Placement};
 use crate::geometry::masks::Masks;
 use crate::geometry::moved::Moved;
-use crate::geometry::primitives::{MAX_INSTANCES, Primitives};
+use crate::geometry::primitives::MAX_INSTANCES;
 use crate::geometry::{Geometry, Instance};
 use crate::parallel::map;
-use crate::ray::Ray;
 use crate::tree::node::Child;
 use crate::tree::refit::TreePlaces;
 use crate::tree::wide::{PlacedTree, Tree};
@@ -33,12 +32,12 @@ const MANY: usize = 32;
 /// Instances that one thread places at a time, at least.
 const CHUNK: usize = 256;
 
-/// A scene of objects placed by [`Instance`]s, which may move. [`World::fixed`] makes the tree of a scene in which
-/// nothing moves.
+/// A scene of objects placed by [`Instance`]s, which may move. Of a scene in which nothing moves [`Bvh::build`] makes a
+/// tree, from [`Primitives::with_instances`](crate::Primitives::with_instances).
 ///
 /// Moving, adding and removing instances builds the top level from scratch, which is the nodes above the objects, and
 /// nothing else. So does [refitting](World::refit) objects, beside the objects themselves. Answers equal the answers of
-/// [`World::fixed`] over the same geometry, bit for bit.
+/// such a tree, bit for bit.
 ///
 /// A world keeps copies of the trees of its objects: they are built once for all worlds, and copied once for each.
 /// `objects` may be a list of `Object`, `&Object` or `Arc<Object>`.
@@ -105,25 +104,6 @@ impl World {
     /// [widths](crate::Recipe::width); [`Error::Moves`] for an instance that moves while rays are traced.
     pub fn new(objects: &[impl AsRef<Object>], instances: &[Instance]) -> Result<Self, Error> {
         Self::put_together(None, objects, instances)
-    }
-
-    /// Tree of a scene: geometries of the ground, objects as lists of geometries, and instances.
-    /// Without `rays` it is learned from surface rays, as by [`Bvh::learn`].
-    ///
-    /// Takes longer to build than a world of finished objects, and answers faster: training rays are followed from the top
-    /// level into the objects, and both are learned together. An object that no instance places costs nothing.
-    ///
-    /// # Errors
-    /// As [`Primitives::with_instances`].
-    pub fn fixed<'a>(
-        ground: &[Geometry<'_>],
-        objects: &[impl AsRef<[Geometry<'a>]>],
-        instances: &[Instance],
-        rays: &[Ray],
-        recipe: &Recipe,
-    ) -> Result<Bvh, Error> {
-        let primitives = Primitives::with_instances(ground, objects, instances)?;
-        Bvh::learn(&primitives, rays, recipe)
     }
 
     /// Places objects on a ground: geometry that lies in the world itself. Hits of the ground have the `inst_id`

@@ -98,7 +98,10 @@ impl Primitives {
         Self::with_instances(geometries, &[[]; 0], &[])
     }
 
-    /// A scene on two levels, for those who make several trees of it: [`World::fixed`](crate::World::fixed) makes one.
+    /// A scene on two levels in which no instance is moved later: [`Bvh::build`](crate::Bvh::build) and
+    /// [`Bvh::learn`](crate::Bvh::learn) make a tree of it. They take longer than a [`World`](crate::World) of finished objects,
+    /// and the tree answers faster: training rays are followed from the top level into the objects, and both are learned
+    /// together.
     ///
     /// Geometries lie in the world itself, beside `instances`, each of which places
     /// one of the `objects`. An object is a list of geometries and is stored once, however often it is
