@@ -397,7 +397,7 @@ fn moved(
     let over = |first: &[Geometry<'_>], instances: &[Instance]| {
         Primitives::with_instances(ground, &[first, second], instances).expect("in range")
     };
-    answers_as(world.bvh(), &over(first, instances), rays, "world");
+    answers_as(&world, &over(first, instances), rays, "world");
     let mut instances = instances.to_vec();
     instances.reverse();
     let by = script.point();
@@ -424,5 +424,5 @@ fn moved(
         world.set_instances(&instances).expect("in range");
     }
     let first = if changed { &vertices } else { first };
-    answers_as(world.bvh(), &over(first, &instances), rays, "moved world");
+    answers_as(&world, &over(first, &instances), rays, "moved world");
 }

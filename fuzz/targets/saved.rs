@@ -135,7 +135,7 @@ fuzz_target!(|bytes: &[u8]| {
         }
         2 => {
             if let Some((mut world, functions)) = read::<World>(b"ANTUWRLD", contents) {
-                ask_saved(world.bvh().clone(), &functions);
+                ask_saved(Bvh::clone(&world), &functions);
                 let bytes = world.to_bytes();
                 let again: World = functions.from_bytes(&bytes).expect("a file of ours");
                 assert_eq!(again.to_bytes(), bytes);
@@ -143,13 +143,13 @@ fuzz_target!(|bytes: &[u8]| {
                 moved.reverse();
                 moved.extend(moved.clone());
                 if world.set_instances(&moved).is_ok() {
-                    ask(world.bvh().clone());
+                    ask(Bvh::clone(&world));
                 }
             }
         }
         _ => {
             if let Some((object, functions)) = read::<Object>(b"ANTUOBJT", contents) {
-                ask_saved(object.bvh().clone(), &functions);
+                ask_saved(Bvh::clone(&object), &functions);
                 let here = [
                     [1.0, 0.5, 0.0, 0.2],
                     [0.0, 1.0, 0.0, 0.0],
@@ -157,7 +157,7 @@ fuzz_target!(|bytes: &[u8]| {
                 ];
                 let here = [Instance::new(0, here)];
                 if let Ok(world) = World::on_ground(&object, &[&object], &here) {
-                    ask(world.bvh().clone());
+                    ask(Bvh::clone(&world));
                 }
             }
         }

@@ -240,7 +240,7 @@ pub unsafe extern "C" fn antumbra_object_bvh(
     guarded(|| {
         // SAFETY: the header says what is at these addresses.
         let (object, slot) = unsafe { (shared(object, "object")?, Slot::new(bvh, "bvh")?) };
-        slot.put(std::ptr::from_ref(object.object.bvh()));
+        slot.put(std::ptr::from_ref::<Bvh>(&object.object));
         Ok(())
     })
 }

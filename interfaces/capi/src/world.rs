@@ -129,7 +129,7 @@ pub unsafe extern "C" fn antumbra_world_bvh(
     guarded(|| {
         // SAFETY: the header says what is at these addresses.
         let (world, slot) = unsafe { (shared(world, "world")?, Slot::new(bvh, "bvh")?) };
-        slot.put(std::ptr::from_ref(world.world.bvh()));
+        slot.put(std::ptr::from_ref::<Bvh>(&world.world));
         Ok(())
     })
 }
@@ -252,7 +252,7 @@ pub unsafe extern "C" fn antumbra_world_set_masks(
 
 /// Fails unless a world has an object of this number.
 fn check_object(world: &OwnWorld, object: u32) -> Outcome {
-    let count = world.world.bvh().report().objects;
+    let count = world.world.report().objects;
     match (object as usize) < count {
         true => Ok(()),
         false => Err(Failure::argument(format_args!(

@@ -116,8 +116,8 @@ impl Committed {
     #[inline]
     pub fn bvh(&self) -> &Bvh {
         match &self.trees.world {
-            Some(world) => world.bvh(),
-            None => self.trees.ground.bvh(),
+            Some(world) => world,
+            None => &self.trees.ground,
         }
     }
 
@@ -246,8 +246,8 @@ impl Plan {
                 ..Traits::NONE
             }))
             .fold(Traits::NONE, Traits::and);
-        let report = object.bvh().report();
-        let world_bytes = world.as_ref().map_or(0, |world| world.bvh().report().bytes);
+        let report = object.report();
+        let world_bytes = world.as_ref().map_or(0, |world| world.report().bytes);
         let bytes = (report.bytes + world_bytes) as isize;
         self.device.count_memory(bytes)?;
         Ok(Committed {

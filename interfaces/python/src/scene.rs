@@ -79,7 +79,7 @@ impl SceneData {
     pub fn bvh(&self) -> &Bvh {
         match &self.tree {
             Tree::Fixed(bvh) => bvh,
-            Tree::World(world) => world.bvh(),
+            Tree::World(world) => world,
         }
     }
 

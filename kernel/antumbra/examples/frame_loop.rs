@@ -114,7 +114,7 @@ fn main() -> Result<(), Error> {
     let mut world = World::new(&objects, &instances(0.0))?;
     println!(
         "{} triangles in {OBJECTS} objects, built in {:.0} ms",
-        world.bvh().report().primitives,
+        world.report().primitives,
         ms(start.elapsed())
     );
 
@@ -162,7 +162,7 @@ fn main() -> Result<(), Error> {
             let refit = start.elapsed();
 
             let start = Instant::now();
-            world.bvh().batch(&pixels).intersect_into(&mut hits);
+            world.batch(&pixels).intersect_into(&mut hits);
             let seen = start.elapsed();
 
             shadows = (pixels.iter().zip(&hits))
@@ -176,7 +176,7 @@ fn main() -> Result<(), Error> {
             occluded.clear();
             occluded.resize(shadows.len(), false);
             let start = Instant::now();
-            world.bvh().batch(&shadows).occluded_into(&mut occluded);
+            world.batch(&shadows).occluded_into(&mut occluded);
             let shadow = start.elapsed();
 
             let start = Instant::now();

@@ -85,7 +85,7 @@ fn main() -> Result<(), Error> {
             world.set_instances(&instances)?;
             update = update.min(start.elapsed().as_secs_f64());
             let start = Instant::now();
-            world.bvh().batch(&rays).occluded_into(&mut occluded);
+            world.batch(&rays).occluded_into(&mut occluded);
             query = query.min(start.elapsed().as_secs_f64());
         }
         let blocked = occluded.iter().filter(|occluded| **occluded).count();

@@ -72,6 +72,20 @@ impl Ray {
         }
     }
 
+    /// The ray with another upper end of its interval, in multiples of the direction. With NaN it hits nothing.
+    ///
+    /// ```
+    /// use antumbra::Ray;
+    ///
+    /// let ray = Ray::new([0.0; 3], [0.0, 0.0, 2.0]).far(5.0);
+    /// assert_eq!((ray.tnear, ray.tfar), (0.0, 5.0));
+    /// ```
+    #[must_use]
+    pub fn far(mut self, distance: f32) -> Self {
+        self.tfar = distance;
+        self
+    }
+
     /// The point at distance `t`, in multiples of the direction. Rounded, so it lies near a surface that is hit there and
     /// not on it: see [`Aabb::origin_offset`](crate::Aabb::origin_offset).
     #[must_use]

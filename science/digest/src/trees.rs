@@ -104,7 +104,7 @@ pub fn masked(scene: &Scene, width: Width, mut bvh: Bvh) -> Vec<(&'static str, B
     if !scene.instances.is_empty() {
         let (mut world, _) = world(scene, width);
         world.set_masks(masks);
-        trees.push(("world", world.bvh().clone()));
+        trees.push(("world", Bvh::clone(&world)));
     }
     trees
 }

@@ -1,6 +1,7 @@
 //! A tree to be placed in worlds.
 
 use core::fmt;
+use core::ops::Deref;
 
 use super::build::{Build, Source};
 use super::bvh::Bvh;
@@ -14,7 +15,8 @@ use crate::words::{Kind, Sink, Words};
 
 /// Geometry with its tree, built once and placed in any number of [worlds](crate::World), any number of times.
 ///
-/// Can be shared among threads, by an `Arc` for example.
+/// Can be shared among threads, by an `Arc` for example. An object is used as its [`Bvh`], which answers queries in the
+/// space of the object.
 ///
 /// ```
 /// use std::sync::Arc;
@@ -26,7 +28,7 @@ use crate::words::{Kind, Sink, Words};
 /// let object = Arc::new(Object::build(&geometry, &Recipe::default())?);
 /// let five_along_x = Instance::new(0, [[1.0, 0.0, 0.0, 5.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
 /// let world = World::new(&[object], &[five_along_x])?;
-/// assert!(world.bvh().occluded(&Ray::new([5.2, 0.2, 0.0], [0.0, 0.0, 1.0])));
+/// assert!(world.occluded(&Ray::new([5.2, 0.2, 0.0], [0.0, 0.0, 1.0])));
 /// # Ok::<(), antumbra::Error>(())
 /// ```
 #[derive(Clone)]
@@ -64,11 +66,6 @@ impl Object {
         Ok(())
     }
 
-    /// The tree of the object, in its own space.
-    pub fn bvh(&self) -> &Bvh {
-        &self.bvh
-    }
-
     pub(crate) fn shape(&self) -> &ObjectShape {
         &self.shape
     }
@@ -93,6 +90,14 @@ impl Contents for Object {
         }
         let shape = ObjectShape::read(words, bvh.bounds().reach())?;
         Ok(Self { bvh, shape })
+    }
+}
+
+impl Deref for Object {
+    type Target = Bvh;
+
+    fn deref(&self) -> &Bvh {
+        &self.bvh
     }
 }
 

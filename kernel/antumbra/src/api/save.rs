@@ -266,7 +266,7 @@ leaf.write(&mut file)?;
 let loaded = Object::read(&file[..])?;
 let here = Instance::new(0, [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
 let world = World::new(&[loaded], &[here])?;
-assert!(world.bvh().occluded(&Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])));
+assert!(world.occluded(&Ray::new([0.2, 0.2, 0.0], [0.0, 0.0, 1.0])));
 # Ok::<(), antumbra::Error>(())
 ```"
 );
@@ -288,9 +288,9 @@ world.write(&mut file)?;
 
 let mut loaded = World::read(&file[..])?;
 let ray = Ray::new([7.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
-assert!(!loaded.bvh().occluded(&ray));
+assert!(!loaded.occluded(&ray));
 loaded.set_instances(&[place(7.0)])?;
-assert!(loaded.bvh().occluded(&ray));
+assert!(loaded.occluded(&ray));
 # Ok::<(), antumbra::Error>(())
 ```"
 );

@@ -48,6 +48,20 @@ impl Instance {
             moves_to: Vec::new(),
         }
     }
+
+    /// [`Instance::new`] of a matrix by columns, translation last, as `Affine3A::to_cols_array_2d` of glam returns it.
+    ///
+    /// ```
+    /// use antumbra::Instance;
+    ///
+    /// let moved = Instance::from_columns(0, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [5.0, 6.0, 7.0]]);
+    /// assert_eq!(moved.transform, [[1.0, 0.0, 0.0, 5.0], [0.0, 1.0, 0.0, 6.0], [0.0, 0.0, 1.0, 7.0]]);
+    /// ```
+    #[must_use]
+    pub fn from_columns(object: u32, columns: [[f32; 3]; 4]) -> Self {
+        let row = |row: usize| columns.map(|column| column[row]);
+        Self::new(object, [row(0), row(1), row(2)])
+    }
 }
 
 /// An affine map in double precision.

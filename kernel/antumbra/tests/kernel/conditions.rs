@@ -321,7 +321,7 @@ fn masks_of_a_world_stay() {
     world.set_masks(masks);
     let ray = Ray::new([0.3, 0.1, 0.0], [0.0, 0.0, 1.0]);
     let seen = |world: &World, mask: u32| {
-        let hits = world.bvh().query(&ray).mask(mask).all_hits();
+        let hits = world.query(&ray).mask(mask).all_hits();
         hits.iter().map(|hit| hit.inst_id).collect::<Vec<_>>()
     };
     assert_eq!(seen(&world, 0b001), [INVALID_ID]);
@@ -336,7 +336,7 @@ fn masks_of_a_world_stay() {
         "it has moved, and the third has another mask"
     );
     let asked = |mask: u32| {
-        let query = world.bvh().query(&ray).mask(mask);
+        let query = world.query(&ray).mask(mask);
         (query.occluded(), query.intersect().map(|hit| hit.inst_id))
     };
     assert_eq!([asked(0b010), asked(0b1000)], [(false, None); 2]);

@@ -435,9 +435,6 @@ fn worlds_hold_curves() {
     let place = |x| Instance::new(0, translation([x, 0.0, 0.0]));
     let world = World::new(&[object], &[place(0.0), place(5.0)]).expect("an object that is there");
     let ray = |x: f32| Ray::new([x, 0.5, 3.0], [0.0, 0.0, -1.0]);
-    assert_eq!(
-        world.bvh().intersect(&ray(5.05)).map(|hit| hit.inst_id),
-        Some(1)
-    );
-    assert!(!world.bvh().occluded(&ray(2.0)));
+    assert_eq!(world.intersect(&ray(5.05)).map(|hit| hit.inst_id), Some(1));
+    assert!(!world.occluded(&ray(2.0)));
 }

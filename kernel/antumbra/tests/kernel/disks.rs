@@ -401,7 +401,7 @@ fn worlds_and_masks_know_disks() {
     let object = Object::build(&[Geometry::disks(vec![UNIT])], &Recipe::default()).expect("a disk");
     let place = |x| Instance::new(0, translation([x, 0.0, 0.0]));
     let world = World::new(&[object], &[place(0.0), place(5.0)]).expect("an object that is there");
-    let hit = world.bvh().intersect(&up(5.5, 0.0)).expect("the second");
+    let hit = world.intersect(&up(5.5, 0.0)).expect("the second");
     assert_eq!((hit.inst_id, hit.t), (1, 1.0));
 
     let two = [

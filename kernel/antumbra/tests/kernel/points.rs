@@ -126,7 +126,7 @@ proptest! {
         let world = World::on_ground(&build(&scene.ground()), &objects, &scene.instances).expect("in range");
         let brute = Brute::new(&scene.primitives());
         let points = points(&mut rng, &brute, 40);
-        check(world.bvh(), &brute, &points, &mut rng, &format!("seed {seed}"));
+        check(&world, &brute, &points, &mut rng, &format!("seed {seed}"));
     }
 }
 

@@ -373,8 +373,8 @@ fn trees_with_user_geometry_join_worlds() {
     let soup = mesh::soup(&mut rng, 40);
     let rays = kernel_rays(&rays::around(&mut rng, &soup, 300));
     for ray in &rays {
-        assert_eq!(bits(world.bvh().intersect(ray)), bits(brute.intersect(ray)));
-        assert_eq!(world.bvh().occluded(ray), brute.occluded(ray));
+        assert_eq!(bits(world.intersect(ray)), bits(brute.intersect(ray)));
+        assert_eq!(world.occluded(ray), brute.occluded(ray));
     }
     for_every_tree(&all, &rays, |bvh, tree| {
         let point = [0.1, 0.2, 0.3];

@@ -38,7 +38,7 @@ fn build_objects(scene: &Scene, recipe: &Recipe) -> Vec<Arc<Object>> {
 fn check(world: &World, scene: &Scene, rng: &mut Rng, place: &str) {
     let rays = scene.rays(rng, 100);
     let expected = Expected::new(&scene.primitives(), &rays, place);
-    expected.check(world.bvh(), &rays, place);
+    expected.check(&world, &rays, place);
 }
 
 /// Reads a file of a scene, all shapes of which are the same.
@@ -123,14 +123,14 @@ proptest! {
             world.set_instances(&scene.instances).expect("objects in range");
         }
         // Room for a larger top level is no obstacle to saving, and what is loaded moves on.
-        let file = world.bvh().to_bytes();
+        let file = Bvh::to_bytes(&world);
         let read: Bvh = functions_of(&scene, &file);
         let file = world.to_bytes();
         let mut loaded: World = functions_of(&scene, &file);
         prop_assert!(loaded.to_bytes() == file, "seed {seed}");
         let rays = scene.rays(&mut rng, 30);
         for ray in &rays {
-            let all = [&read, loaded.bvh(), world.bvh()];
+            let all: [&Bvh; 3] = [&read, &loaded, &world];
             let hits = all.map(|bvh| bits(bvh.intersect(ray)));
             prop_assert!(hits[0] == hits[2] && hits[1] == hits[2]);
             let near = all.map(|bvh| bvh.closest(ray.org, f32::INFINITY));
@@ -150,11 +150,11 @@ proptest! {
                 Err(error) => panic!("seed {seed}: {error}"),
             }
             check(&loaded, &scene, &mut rng, &format!("seed {seed} loaded, step {step}"));
-            loaded.bvh().validate().expect("promises are kept");
+            loaded.validate().expect("promises are kept");
             for object in 0..scene.objects.len() as u32 {
                 prop_assert_eq!(loaded.quality(object), world.quality(object));
             }
-            prop_assert_eq!(loaded.bvh().bounds(), world.bvh().bounds());
+            prop_assert_eq!(loaded.bounds(), world.bounds());
         }
         // The same objects once more, in a world without a ground.
         scene.world.clear();
@@ -184,7 +184,7 @@ proptest! {
                     // The copy stands where the world stood before.
                     _ => world.adopt(&copy.relearn(&rays, &recipe.order(order))),
                 }
-                world.bvh().validate().expect("promises are kept");
+                world.validate().expect("promises are kept");
                 check(&world, &scene, &mut rng, &format!("seed {seed} step {step} learned"));
             }
             let object = deform(&mut scene, &mut rng);
@@ -227,10 +227,10 @@ fn objects_keep_their_filters() {
         })
         .collect();
     let expected = Expected::new(&primitives, &rays, "stripess");
-    expected.check(world.bvh(), &rays, "stripess");
+    expected.check(&world, &rays, "stripess");
     let fixed = Bvh::learn(&primitives, &rays, &recipe).expect("in range");
     expected.check(&fixed, &rays, "fixed stripes");
-    assert_eq!(world.bvh().report().cutouts, 6);
+    assert_eq!(world.report().cutouts, 6);
 }
 
 /// What cannot be done is an error, and the world stays as it was.
@@ -271,17 +271,17 @@ fn errors_leave_the_world_alone() {
     );
     assert_eq!(world.instances(), std::slice::from_ref(&here));
     let ray = Ray::new([0.1, 0.2, 0.0], [0.0, 0.0, 1.0]);
-    let hit = world.bvh().intersect(&ray).expect("still there");
+    let hit = world.intersect(&ray).expect("still there");
     assert_eq!((hit.t, hit.inst_id), (1.0, 0));
     // What has no inverse is dropped and counted.
     let flat = Instance::new(here.object, [[0.0; 4]; 3]);
     world.set_instances(&[flat, here]).expect("dropped");
-    assert_eq!(world.bvh().report().dropped, 1);
-    world.bvh().validate().expect("promises are kept");
-    let hit = world.bvh().intersect(&ray).expect("still there");
+    assert_eq!(world.report().dropped, 1);
+    world.validate().expect("promises are kept");
+    let hit = world.intersect(&ray).expect("still there");
     assert_eq!(hit.inst_id, 1);
     world.set_instances(&[]).expect("nothing is fine");
-    assert!(!world.bvh().occluded(&ray));
+    assert!(!world.occluded(&ray));
     assert_eq!(
         world.refit(&[(World::GROUND, &list)], &[]),
         Err(Error::OtherPrimitives {
@@ -316,8 +316,8 @@ fn a_large_ground_moves() {
     let rays: Vec<_> = (0..500)
         .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))
         .collect();
-    world.bvh().validate().expect("promises are kept");
-    Expected::new(&primitives, &rays, "ground").check(world.bvh(), &rays, "ground");
+    world.validate().expect("promises are kept");
+    Expected::new(&primitives, &rays, "ground").check(&world, &rays, "ground");
 }
 
 /// What was learned of the top level is kept when instances move, also by a copy that has not learned itself.
@@ -350,12 +350,10 @@ fn worlds_keep_what_they_learned() {
     }
     let tests = [&mut plain, &mut learned, &mut adopted].map(|world| {
         world.set_instances(&instances).expect("objects in range");
-        world.bvh().validate().expect("promises are kept");
+        world.validate().expect("promises are kept");
         let mut occluded = vec![false; test.len()];
         let mut costs = vec![Cost::default(); test.len()];
-        world
-            .bvh()
-            .occluded_batch_counted(&test, &mut occluded, &mut costs);
+        world.occluded_batch_counted(&test, &mut occluded, &mut costs);
         let nodes: u64 = costs.iter().map(|cost| u64::from(cost.node_tests)).sum();
         (nodes, occluded)
     });

@@ -7,6 +7,7 @@ mod saved;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::fmt;
+use core::ops::Deref;
 
 use self::ground::Ground;
 use super::bvh::Bvh;
@@ -40,7 +41,8 @@ const CHUNK: usize = 256;
 /// such a tree, bit for bit.
 ///
 /// A world keeps copies of the trees of its objects: they are built once for all worlds, and copied once for each.
-/// `objects` may be a list of `Object`, `&Object` or `Arc<Object>`.
+/// Wherever it takes an object, `Object`, `&Object` and `Arc<Object>` are alike. A world is used as the [`Bvh`] over
+/// everything, which answers queries.
 ///
 /// ```
 /// use antumbra::{Geometry, Instance, Object, Ray, Recipe, World};
@@ -52,10 +54,10 @@ const CHUNK: usize = 256;
 /// let place = |x| Instance::new(0, [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
 /// let mut world = World::new(&[&leaf], &[place(0.0), place(5.0)])?;
 /// let ray = Ray::new([7.2, 0.2, 0.0], [0.0, 0.0, 1.0]);
-/// assert_eq!(world.bvh().intersect(&ray), None);
+/// assert_eq!(world.intersect(&ray), None);
 ///
 /// world.set_instances(&[place(0.0), place(7.0), place(9.0)])?;
-/// let hit = world.bvh().intersect(&ray).expect("it moved there");
+/// let hit = world.intersect(&ray).expect("it moved there");
 /// assert_eq!(hit.inst_id, 1);
 /// # Ok::<(), antumbra::Error>(())
 /// ```
@@ -112,16 +114,11 @@ impl World {
     /// # Errors
     /// As [`World::new`].
     pub fn on_ground(
-        ground: &Object,
+        ground: impl AsRef<Object>,
         objects: &[impl AsRef<Object>],
         instances: &[Instance],
     ) -> Result<Self, Error> {
-        Self::put_together(Some(ground), objects, instances)
-    }
-
-    /// The tree over everything, for queries.
-    pub fn bvh(&self) -> &Bvh {
-        &self.bvh
+        Self::put_together(Some(ground.as_ref()), objects, instances)
     }
 
     /// The instances as they were given last.
@@ -141,7 +138,7 @@ impl World {
     /// let at = |x| Instance::new(0, [[1.0, 0.0, 0.0, x], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]);
     /// let mut world = World::new(&[object], &[at(0.0)])?;
     /// world.set_instances(&[at(5.0), at(9.0)])?;
-    /// let hit = world.bvh().intersect(&Ray::new([9.2, 0.2, 0.0], [0.0, 0.0, 1.0]));
+    /// let hit = world.intersect(&Ray::new([9.2, 0.2, 0.0], [0.0, 0.0, 1.0]));
     /// assert_eq!(hit.map(|hit| hit.inst_id), Some(1));
     /// # Ok::<(), antumbra::Error>(())
     /// ```
@@ -175,13 +172,13 @@ impl World {
     ///
     /// # Errors
     /// More nodes or leaves than can be numbered; an object of another width. All stays as it is then.
-    pub fn add_object(&mut self, object: &Object) -> Result<u32, Error> {
-        self.join(object, Some(self.objects.len() as u32))
+    pub fn add_object(&mut self, object: impl AsRef<Object>) -> Result<u32, Error> {
+        self.join(object.as_ref(), Some(self.objects.len() as u32))
     }
 
     /// Adds an object, or the ground, which has no number.
     fn join(&mut self, object: &Object, number: Option<u32>) -> Result<u32, Error> {
-        let places = self.bvh.tree.join(&object.bvh().tree, number)?;
+        let places = self.bvh.tree.join(&object.tree, number)?;
         self.bvh.tree.roots.push(places.nodes.start as u32);
         self.count(object);
         self.objects.push(Joined::new(object, places));
@@ -212,12 +209,12 @@ impl World {
         instances: &[Instance],
     ) -> Result<Self, Error> {
         let objects = || objects.iter().map(AsRef::as_ref);
-        let first = ground.or(objects().next()).map(Object::bvh);
+        let first = ground.or(objects().next());
         let recipe = Recipe::default();
-        let isa = first.map_or(recipe.isa, Bvh::isa);
-        let width = first.map_or(recipe.width, Bvh::width);
+        let isa = first.map_or(recipe.isa, |object| object.isa());
+        let width = first.map_or(recipe.width, |object| object.width());
         let trees = ground.into_iter().chain(objects());
-        let trees: Vec<_> = trees.map(|object| &object.bvh().tree).collect();
+        let trees: Vec<_> = trees.map(|object| &object.tree).collect();
         let tree = Tree::with_room_for(width, &trees);
         let mut world = Self {
             bvh: Bvh::over_nothing(tree, isa),
@@ -252,7 +249,7 @@ impl World {
 
     /// Counts an object that joins.
     fn count(&mut self, object: &Object) {
-        let (own, other) = (&mut self.bvh, object.bvh());
+        let (own, other) = (&mut self.bvh, object);
         own.primitives += other.primitives;
         own.cutouts += other.cutouts;
         own.transparent += other.transparent;
@@ -447,16 +444,23 @@ impl World {
     }
 }
 
+impl Deref for World {
+    type Target = Bvh;
+
+    fn deref(&self) -> &Bvh {
+        &self.bvh
+    }
+}
+
 impl Joined {
     fn new(object: &Object, places: TreePlaces) -> Self {
-        let bvh = object.bvh();
         Self {
             places,
             shape: object.shape().clone(),
-            kept: bvh.primitives + bvh.transparent,
-            weight: instance_weight(bvh.primitives),
-            depth: bvh.tree.depth,
-            built_sah: bvh.built_sah,
+            kept: object.primitives + object.transparent,
+            weight: instance_weight(object.primitives),
+            depth: object.tree.depth,
+            built_sah: object.built_sah,
         }
     }
 

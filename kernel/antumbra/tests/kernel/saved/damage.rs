@@ -255,16 +255,16 @@ fn forged_worlds_do_no_harm() {
             match functions.from_bytes::<World>(&forged(&mut rng, &good)) {
                 Err(_) => refused += 1,
                 Ok(mut world) => {
-                    ask(world.bvh(), rays);
+                    ask(&world, rays);
                     let moved: Vec<_> = world.instances().iter().rev().cloned().collect();
                     let _ = world.set_instances(&moved);
-                    ask(world.bvh(), rays);
+                    ask(&world, rays);
                     let _ = world.refit(&[(0, &lists[0]), (1, &lists[1])], &scene.instances);
                     world.relearn(rays, &recipe);
-                    ask(world.bvh(), rays);
+                    ask(&world, rays);
                     let many = scene.instances.iter().cycle().take(200).cloned();
                     let _ = world.set_instances(&many.collect::<Vec<_>>());
-                    ask(world.bvh(), rays);
+                    ask(&world, rays);
                     taken += 1;
                 }
             }
@@ -273,10 +273,10 @@ fn forged_worlds_do_no_harm() {
                 Ok(mut object) => {
                     let world = World::on_ground(&object, &[&object], &scene.instances[..1]);
                     if let Ok(world) = world {
-                        ask(world.bvh(), rays);
+                        ask(&world, rays);
                     }
                     let _ = object.refit(&lists[1]);
-                    ask(object.bvh(), rays);
+                    ask(&object, rays);
                     taken += 1;
                 }
             }

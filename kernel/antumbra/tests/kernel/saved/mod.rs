@@ -274,23 +274,20 @@ fn loaded_worlds_move_like_the_original() {
         assert!(written == file);
         let mut loaded: World = scene.read(&file);
         assert!(loaded.to_bytes() == file);
-        assert_eq!(
-            counts(loaded.bvh(), &scene.rays),
-            counts(world.bvh(), &scene.rays)
-        );
+        assert_eq!(counts(&loaded, &scene.rays), counts(&world, &scene.rays));
         assert_eq!(loaded.instances(), world.instances());
         let check = |loaded: &World, world: &World, instances: &[Instance]| {
-            loaded.bvh().validate().expect("a sound tree");
+            loaded.validate().expect("a sound tree");
             let all = Primitives::with_instances(&scene.ground(), &scene.objects(), instances);
             let brute = Brute::new(&all.expect("in range"));
             let mut hits = vec![None; scene.rays.len()];
-            loaded.bvh().batch(&scene.rays).intersect_into(&mut hits);
+            loaded.batch(&scene.rays).intersect_into(&mut hits);
             for (ray, hit) in scene.rays.iter().zip(hits) {
                 assert_eq!(bits(hit), bits(brute.intersect(ray)), "x{width}");
-                assert_eq!(bits(hit), bits(world.bvh().intersect(ray)), "x{width}");
-                assert_eq!(loaded.bvh().occluded(ray), brute.occluded(ray), "x{width}");
+                assert_eq!(bits(hit), bits(world.intersect(ray)), "x{width}");
+                assert_eq!(loaded.occluded(ray), brute.occluded(ray), "x{width}");
             }
-            let [a, b] = [loaded, world].map(|world| world.bvh().report());
+            let [a, b] = [loaded, world].map(|world| world.report());
             assert_eq!(
                 (a.primitives, a.cutouts, a.dropped),
                 (b.primitives, b.cutouts, b.dropped)
@@ -350,7 +347,7 @@ fn loaded_objects_are_placed_as_the_original() {
         let same = |a: &World, b: &World| {
             assert!(a.to_bytes() == b.to_bytes());
             for ray in &scene.rays {
-                assert_eq!(bits(a.bvh().intersect(ray)), bits(b.bvh().intersect(ray)));
+                assert_eq!(bits(a.intersect(ray)), bits(b.intersect(ray)));
             }
         };
         same(&place(&loaded), &place(&built));
@@ -358,7 +355,7 @@ fn loaded_objects_are_placed_as_the_original() {
             object.refit(&list).expect("as before");
         }
         same(&place(&loaded), &place(&built));
-        assert_eq!(loaded.bvh().quality(), built.bvh().quality());
+        assert_eq!(loaded.quality(), built.quality());
     }
 }
 
