@@ -148,10 +148,8 @@ pub fn ambient_rays(
         if let Some(unit) = unit_normal(point, normal) {
             let org = above(&bounds, point, unit);
             let directions = samples.around(unit, key(options.seed, point, normal));
-            rays.extend((0..per_point as u32).map(|sample| Ray {
-                tfar: options.distance,
-                ..Ray::new(org, directions.get(sample))
-            }));
+            let ray = |sample| Ray::new(org, directions.get(sample)).far(options.distance);
+            rays.extend((0..per_point as u32).map(ray));
         }
     }
     rays.truncate(count);
@@ -402,12 +400,7 @@ mod tests {
             let samples = Samples::new(options.samples / 2, options.weighting);
             let directions = samples.around(up, key(options.seed, point, normal));
             let org = [0, 1, 2].map(|axis| (f64::from(point[axis]) + offset * up[axis]) as f32);
-            let dir = directions.get(sample);
-            let ray = Ray {
-                tfar: options.distance,
-                ..Ray::new(org, dir)
-            };
-            !brute.occluded(&ray)
+            !brute.occluded(&Ray::new(org, directions.get(sample)).far(options.distance))
         };
         let open = |sign| (0..options.samples).filter(|&i| is_open(sign, i)).count();
         let most = match options.two_sided {
