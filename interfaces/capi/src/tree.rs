@@ -143,7 +143,7 @@ pub unsafe extern "C" fn antumbra_bvh_quality(bvh: *const Bvh, quality: *mut f64
     guarded(|| {
         // SAFETY: the header says what is at these addresses.
         let (bvh, slot) = unsafe { (shared(bvh, "bvh")?, Slot::new(quality, "quality")?) };
-        slot.put(bvh.quality());
+        slot.put(bvh.report().quality);
         Ok(())
     })
 }

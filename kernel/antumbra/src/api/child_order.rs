@@ -137,7 +137,7 @@ impl Bvh {
     /// thousand. Rays of the last frames are a good sample, see [`RayMemory`](crate::RayMemory). Without rays an order that
     /// [learns](crate::recipe::Order::learns) changes nothing, and [`Order::Simple`](crate::recipe::Order::Simple) never does.
     ///
-    /// A tree that [moves](Bvh::moves) keeps its order.
+    /// A tree that [moves](Bvh::moving) keeps its order.
     ///
     /// ```
     /// # use antumbra::{Bvh, Geometry, Ray, Recipe};

@@ -73,8 +73,7 @@ impl Bvh {
     }
 
     /// Whether anything moves while rays are traced.
-    #[must_use]
-    pub fn moves(&self) -> bool {
+    pub(crate) fn moves(&self) -> bool {
         self.tree.motion.is_some()
     }
 

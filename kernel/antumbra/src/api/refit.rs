@@ -12,8 +12,8 @@ impl Bvh {
     /// functions are replaced.
     ///
     /// Nodes, collapse and child order stay. Answers equal the answers of a tree built from scratch over `geometries`,
-    /// bit for bit. [`Bvh::quality`] returns what a query in the old nodes costs, relative to the build. A refit is far
-    /// cheaper than a build, and shared among the threads of the current rayon pool.
+    /// bit for bit. [`BuildReport::quality`](crate::BuildReport::quality) is what a query in the old nodes costs, relative to
+    /// the build. A refit is far cheaper than a build, and shared among the threads of the current rayon pool.
     ///
     /// A builder may leave some triangles in several leaves, each with a box around a part
     /// of it. After a refit each of these boxes is around the whole triangle, so such a tree loses more than others.
@@ -45,7 +45,8 @@ impl Bvh {
             return Err(Error::HasInstances);
         }
         let moved = Moved::new(geometries, self.primitives + self.transparent)?;
-        let sah = self.built_sah();
+        let now = || self.tree.sah(&CostModel::default());
+        let sah = self.built_sah.unwrap_or_else(now);
         let tree = &mut self.tree;
         let places = tree.all_places();
         tree.check_moved(&places, &moved)?;
@@ -57,24 +58,5 @@ impl Bvh {
         self.predicted_cost = None;
         self.predicted_before = None;
         Ok(())
-    }
-
-    /// Expected cost of a ray now over the expected cost when the tree was built, by the surface area heuristic: 1
-    /// before any [refit](Bvh::refit), and more the worse the nodes suit what has moved. From about 1.5 on, a build soon
-    /// pays.
-    ///
-    /// Walks all nodes.
-    #[must_use]
-    pub fn quality(&self) -> f64 {
-        self.built_sah.map_or(1.0, |built| self.sah() / built)
-    }
-
-    /// Expected cost before the first refit.
-    fn built_sah(&self) -> f64 {
-        self.built_sah.unwrap_or_else(|| self.sah())
-    }
-
-    fn sah(&self) -> f64 {
-        self.tree.sah(&CostModel::default())
     }
 }

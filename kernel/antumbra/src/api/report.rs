@@ -45,6 +45,9 @@ pub struct BuildReport {
     /// cost in the default [`crate::recipe::CostModel`], times their area relative to the root's. Only the cost of the
     /// root if the root has no area.
     pub sah: f64,
+    /// This cost over the cost when the tree was built: 1 before any [refit](Bvh::refit), and more the worse the nodes suit
+    /// what has moved. From about 1.5 on, a build soon pays.
+    pub quality: f64,
     /// Mean cost of an occlusion query by the paper's equation (1), estimated from the training log in units of the
     /// recipe's costs. `None` without a log, and for an order that picks by ray.
     pub predicted_cost: Option<f64>,
@@ -52,6 +55,8 @@ pub struct BuildReport {
     pub predicted_cost_before: Option<f64>,
     /// Rays that the child order was learned from.
     pub training_rays: u64,
+    /// Whether anything moves while rays are traced.
+    pub moves: bool,
     /// Whether batches prefetch nodes and leaves: see [`Recipe::prefetch`](crate::Recipe::prefetch).
     pub prefetches: bool,
     /// Times of the steps; `None` without a [clock](crate::Recipe::clock).
@@ -63,6 +68,7 @@ impl Bvh {
     #[must_use]
     pub fn report(&self) -> BuildReport {
         let tree = &self.tree;
+        let sah = tree.sah(&CostModel::default());
         BuildReport {
             primitives: self.primitives,
             cutouts: self.cutouts,
@@ -75,10 +81,12 @@ impl Bvh {
             leaves: tree.leaf_count() - 1,
             depth: tree.depth,
             bytes: tree.bytes(),
-            sah: tree.sah(&CostModel::default()),
+            sah,
+            quality: self.built_sah.map_or(1.0, |built| sah / built),
             predicted_cost: self.predicted_cost,
             predicted_cost_before: self.predicted_before,
             training_rays: self.training_rays,
+            moves: self.moves(),
             prefetches: self.prefetches(),
             times: self.times,
         }

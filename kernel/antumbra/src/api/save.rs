@@ -139,7 +139,7 @@ impl Bvh {
     /// The bytes that [`Bvh::write`] writes.
     ///
     /// # Panics
-    /// If the tree [moves](Bvh::moves), for which [`Bvh::write`] returns an error.
+    /// If the tree [moves](Bvh::moving), for which [`Bvh::write`] returns an error.
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         to_bytes(self)

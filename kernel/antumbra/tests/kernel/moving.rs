@@ -94,7 +94,7 @@ fn check(scene: &Primitives, rng: &mut Rng, rays: &[Ray], what: &str) -> [usize;
         let mut bvh = Bvh::build(scene, &recipe.width(width)).expect("checked");
         bvh.set_masks(masks.clone());
         bvh.validate().expect("valid");
-        assert!(bvh.moves() && scene.moves());
+        assert!(bvh.report().moves && scene.moves());
         for isa in antumbra::Isa::available() {
             bvh.set_isa(isa);
             // Two conditions at a time, and all in turns.
@@ -484,7 +484,7 @@ fn nothing_moves_in_a_scene_of_one_key() {
     let instance = Instance::moving(0, [IDENTITY]);
     let still = Primitives::with_instances(&[], &[ball], &[instance]).expect("sound");
     let bvh = Bvh::build(&still, &Recipe::default()).expect("sound");
-    assert!(!still.moves() && !bvh.moves() && still.spans() == 1);
+    assert!(!still.moves() && !bvh.report().moves && still.spans() == 1);
     let ray = Ray::new([0.0, 0.0, -5.0], [0.0, 0.0, 1.0]);
     let hit = bvh.query(&ray).at(0.3).intersect();
     assert_eq!(hit.map(|hit| hit.t), Some(4.0));

@@ -78,7 +78,7 @@ proptest! {
             let recipe = Recipe::default().builder(builder).collapse(collapse).width(width).order(order);
             let place = format!("seed {seed}, {builder} {collapse} x{width} {order}");
             let mut bvh = Bvh::build(&first, &recipe).expect("indices in range");
-            prop_assert_eq!(bvh.quality(), 1.0);
+            prop_assert_eq!(bvh.report().quality, 1.0);
             match bvh.refit(&second) {
                 Ok(()) => {}
                 Err(Error::OtherPrimitives { .. } | Error::PrimitiveIsGone { .. }) => {
@@ -148,10 +148,14 @@ fn quality_tells_when_a_rebuild_pays() {
     let mut bvh = Bvh::build(&[geometry(&before)], &Recipe::default()).expect("indices in range");
     let larger = before.map("larger", |position| position.map(|x| 4.0 * x));
     bvh.refit(&[geometry(&larger)]).expect("all sound");
-    assert!((bvh.quality() - 1.0).abs() < 1e-3, "{}", bvh.quality());
+    assert!(
+        (bvh.report().quality - 1.0).abs() < 1e-3,
+        "{}",
+        bvh.report().quality
+    );
     let torn = before.map("torn", |_| rng.point(1.0));
     bvh.refit(&[geometry(&torn)]).expect("all sound");
-    assert!(bvh.quality() > 3.0, "{}", bvh.quality());
+    assert!(bvh.report().quality > 3.0, "{}", bvh.report().quality);
 }
 
 /// What a rebuild would drop or keep otherwise is an error.

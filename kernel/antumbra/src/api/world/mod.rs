@@ -191,7 +191,7 @@ impl World {
         self.bvh.set_masks(masks);
     }
 
-    /// [`Bvh::quality`] of an object: its expected cost now over its expected cost when it was built.
+    /// [Quality](crate::BuildReport::quality) of an object: its expected cost now over its expected cost when it was built.
     ///
     /// # Panics
     /// If there is no such object.
