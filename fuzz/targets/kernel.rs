@@ -5,9 +5,10 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity};
+use antumbra::shapes::{Sphere, UserGeometry, UserHit};
 use antumbra::{
     Aabb, Brute, Build, Bvh, Geometry, Hit, Instance, Isa, Masks, Object, PrimId, Primitives, Ray,
-    RayQuery, Recipe, Sphere, UserGeometry, UserHit, Width, World,
+    RayQuery, Recipe, Width, World,
 };
 use antumbra_trees::{BUILDERS, ORDERS};
 use libfuzzer_sys::fuzz_target;

@@ -4,9 +4,9 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Opacity};
-use antumbra::{
-    Aabb, Bvh, Functions, Instance, Isa, Object, Ray, Saved, UserGeometry, UserHit, World,
-};
+use antumbra::saved::{Functions, Saved};
+use antumbra::shapes::{UserGeometry, UserHit};
+use antumbra::{Aabb, Bvh, Instance, Isa, Object, Ray, World};
 use libfuzzer_sys::fuzz_target;
 
 fn mixed(z: u64) -> u64 {

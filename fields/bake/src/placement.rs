@@ -290,7 +290,8 @@ fn along(point: [f64; 3], vector: [f64; 3], length: f64) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
-    use antumbra::{Geometry, LocalOrigin, Recipe};
+    use antumbra::LocalOrigin;
+    use antumbra::{Geometry, Recipe};
 
     use super::*;
 

@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 use std::ffi::c_void;
 
-use antumbra::{Build, BuildMonitor, Bvh, Error, Masks, Object, Primitives, Ray, Recipe, Source};
+use antumbra::inputs::Source;
+use antumbra::{Build, BuildMonitor, Bvh, Error, Masks, Object, Primitives, Ray, Recipe};
 
 use crate::arrays::{Items, Slot, Versioned, handles, optional, shared, sized, take_back};
 use crate::recipe::RecipeChoices;

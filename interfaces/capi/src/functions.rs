@@ -6,7 +6,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use antumbra::cutout::{Candidate, Opacity, QueryKind};
-use antumbra::{Aabb, Functions, PrimId, Ray, UserGeometry, UserHit};
+use antumbra::saved::Functions;
+use antumbra::shapes::{UserGeometry, UserHit};
+use antumbra::{Aabb, PrimId, Ray};
 
 use crate::arrays::{Versioned, handles, sized};
 use crate::status::{Failure, Outcome, Status};

@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use antumbra::cutout::Opacity;
-use antumbra::{Curves, Disk, Geometry, LocalOrigin, Sphere, TriangleMesh, UserGeometry};
+use antumbra::shapes::{Curves, Disk, Sphere, TriangleMesh, UserGeometry};
+use antumbra::{Geometry, LocalOrigin};
 
 use crate::arrays::{Items, Slot, exclusive, shared, take_back};
 use crate::functions::{OpacityFunction, UserFunctions};

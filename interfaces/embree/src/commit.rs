@@ -4,9 +4,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use antumbra::recipe::Level;
+use antumbra::shapes::{Disk, Sphere};
 use antumbra::{
-    Build, BuildMonitor, Bvh, Disk, Geometry as Kernel, Hit, Instance, Masks, Object, Recipe,
-    Sphere, Width, World,
+    Build, BuildMonitor, Bvh, Geometry as Kernel, Hit, Instance, Masks, Object, Recipe, Width,
+    World,
 };
 
 use crate::abi::{Bounds, INVALID, ProgressFunction, RtcRay, SCENE_DYNAMIC, SCENE_ROBUST};

@@ -6,7 +6,8 @@
 //! A cubic primitive is a ribbon of quads that face the ray, as many as the tessellation rate says. Each quad lies within the
 //! segment of the kernel with its ends and radii. The kernel finds the segments, and Embree's rule decides which are hit.
 
-use antumbra::{Curves, Geometry as Kernel, Hit};
+use antumbra::shapes::Curves;
+use antumbra::{Geometry as Kernel, Hit};
 
 use crate::abi::RtcRay;
 use crate::commit::{Placed, PlacedInstance};

@@ -9,7 +9,8 @@ use std::fmt;
 use std::ptr;
 use std::sync::Arc;
 
-use antumbra::{Aabb, Ray, UserGeometry, UserHit};
+use antumbra::shapes::{UserGeometry, UserHit};
+use antumbra::{Aabb, Ray};
 
 use crate::abi::{
     Bounds, BoundsArguments, BoundsFunction, Context, FilterArguments, INVALID, IntersectFunction,

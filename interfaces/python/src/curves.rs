@@ -1,6 +1,7 @@
 //! Curves as callers give them, and the straight segments that stand for them.
 
-use antumbra::{CurveBasis, Curves, LocalOrigin};
+use antumbra::LocalOrigin;
+use antumbra::shapes::{CurveBasis, Curves};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use antumbra::cutout::Opacity;
+use antumbra::shapes::Sphere;
 use antumbra::{
     ClosestPoint, Geometry, Hit, INVALID_ID, Instance, LocalOrigin, Masks, PrimId, Primitives,
-    Sphere,
 };
 
 use crate::curves::Segments;

@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use antumbra::{ClosestPoint, Distance, Ray};
+use antumbra::inputs::Distance;
+use antumbra::{ClosestPoint, Ray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;

@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use antumbra::{
-    Batch, Bvh, Column, Distance, INVALID_ID, LocalOrigin, PrimId, Ray, RayColumns, RayOrder,
-};
+use antumbra::inputs::{Column, Distance};
+use antumbra::{Batch, Bvh, INVALID_ID, LocalOrigin, PrimId, Ray, RayColumns, RayOrder};
 use antumbra_bake::SightLines;
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;

@@ -6,7 +6,8 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use antumbra::{Bvh, Instance, LocalOrigin, Sphere, World};
+use antumbra::shapes::Sphere;
+use antumbra::{Bvh, Instance, LocalOrigin, World};
 use antumbra_image::atomic_write;
 use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;

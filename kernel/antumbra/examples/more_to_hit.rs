@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use antumbra::{Aabb, Bvh, Error, Functions, Geometry, Masks, Ray, Recipe, UserGeometry, UserHit};
+use antumbra::saved::Functions;
+use antumbra::shapes::{UserGeometry, UserHit};
+use antumbra::{Aabb, Bvh, Error, Geometry, Masks, Ray, Recipe};
 
 // ANCHOR: user
 /// Discs that face upwards: centre and radius.

@@ -4,7 +4,8 @@
 //!
 //! Prints how much of each place the things cover while the shutter is open.
 
-use antumbra::{Bvh, Geometry, Instance, Primitives, Ray, Recipe, Sphere};
+use antumbra::shapes::Sphere;
+use antumbra::{Bvh, Geometry, Instance, Primitives, Ray, Recipe};
 
 fn main() -> Result<(), antumbra::Error> {
     let door = |angle: f32| -> Vec<[f32; 3]> {

@@ -73,7 +73,7 @@ pub enum Error {
         /// Numbers that the column has.
         found: usize,
     },
-    /// A file was read with too few or too many [functions](crate::Functions).
+    /// A file was read with too few or too many [functions](crate::saved::Functions).
     OtherFunctions {
         /// Plural of the functions: filters or shapes of user geometry.
         what: &'static str,

@@ -68,9 +68,10 @@
 //!
 //! # Where things are
 //! [`Geometry`] and [`Primitives`] go in, a [`Recipe`] says how, [`Bvh`] answers. [`Bvh::batch`] takes many rays, also
-//! from separate arrays ([`RayColumns`]), and [`Bvh::write`] saves a tree. [`cutout`] has partly transparent triangles,
-//! [`UserGeometry`] primitives of your own. [`Bvh::query`] adds [`Masks`] and filters to a query. [`Brute`] gives the
-//! same answers without any tree. [`Build`] has every choice of a build, [`Stage`] makes many trees from one.
+//! from separate arrays ([`RayColumns`]), [`Bvh::points`] many points, and [`Bvh::write`] saves a tree. [`shapes`] has
+//! kinds of geometry one by one and primitives of your own, [`cutout`] partly transparent triangles. [`Bvh::query`] adds
+//! [`Masks`] and filters to a query. [`Brute`] gives the same answers without any tree. [`Build`] has every choice of a
+//! build, [`Stage`] makes many trees from one.
 //!
 //! # Features
 //! - `parallel` (default): builds and batches use the threads of rayon's pool.
@@ -119,7 +120,7 @@ mod words;
 pub use aabb::Aabb;
 pub use antumbra_simd::Isa;
 pub use api::batch::Batch;
-pub use api::build::{Build, Source};
+pub use api::build::Build;
 pub use api::bvh::Bvh;
 pub use api::child_order::ChildOrder;
 pub use api::group::{Directions, Group};
@@ -131,25 +132,41 @@ pub use api::ray_order::RayOrder;
 pub use api::ray_query::RayQuery;
 pub use api::recipe::Recipe;
 pub use api::report::BuildReport;
-pub use api::save::Saved;
 pub use api::stage::Stage;
 pub use api::world::World;
 pub use error::Error;
 pub use geometry::masks::Masks;
 pub use geometry::primitives::Primitives;
-pub use geometry::primitives::dropped::{DropReason, Dropped};
-pub use geometry::{
-    CubicSegments, CurveBasis, Curves, Disk, Functions, Geometry, GeometryId, Instance,
-    LocalOrigin, NestedInstances, QuadMesh, Sphere, TriangleMesh, UserGeometry, UserHit,
-};
+pub use geometry::{Geometry, Instance, LocalOrigin, NestedInstances};
 pub use monitor::BuildMonitor;
 pub use prim_id::PrimId;
 pub use ray::{Hit, INVALID_ID, Ray};
-pub use ray_columns::{Column, Distance, RayColumns, Rays};
+pub use ray_columns::RayColumns;
 pub use trace::brute::Brute;
 pub use trace::surface::Surface;
 pub use trace::visit::Visit;
 pub use tree::width::Width;
+
+/// Kinds of geometry one by one, primitives of your own, and what a build leaves out and why.
+pub mod shapes {
+    pub use crate::geometry::primitives::dropped::{DropReason, Dropped};
+    pub use crate::geometry::{
+        CubicSegments, CurveBasis, Curves, Disk, QuadMesh, Sphere, TriangleMesh, UserGeometry,
+        UserHit,
+    };
+}
+
+/// What calls take in several forms: they take `impl Into` one of these.
+pub mod inputs {
+    pub use crate::api::build::Source;
+    pub use crate::ray_columns::{Column, Distance, Rays};
+}
+
+/// Reading files of trees, objects and worlds whose functions are given again.
+pub mod saved {
+    pub use crate::api::save::Saved;
+    pub use crate::geometry::functions::{Functions, GeometryId};
+}
 
 /// Choices of a [`Recipe`], most of them by name.
 ///

@@ -153,8 +153,8 @@ fn next_up(t: f32) -> f32 {
 pub struct Hit {
     /// Distance along the ray in multiples of its direction.
     pub t: f32,
-    /// Barycentric weight of the triangle's second corner; 0 without corners; of a [quad](crate::QuadMesh) the place
-    /// from corner 0 to corner 1; what [user geometry](crate::UserGeometry) returns.
+    /// Barycentric weight of the triangle's second corner; 0 without corners; of a [quad](crate::shapes::QuadMesh) the
+    /// place from corner 0 to corner 1; what [user geometry](crate::shapes::UserGeometry) returns.
     pub u: f32,
     /// Barycentric weight of the triangle's third corner; 0 without corners; of a quad the place from corner 0 to
     /// corner 3; what user geometry returns.

@@ -8,7 +8,8 @@ use crate::ray::Ray;
 /// Rays of a batch.
 ///
 /// ```
-/// use antumbra::{Ray, Rays};
+/// use antumbra::Ray;
+/// use antumbra::inputs::Rays;
 ///
 /// let list = vec![Ray::new([0.0; 3], [0.0, 0.0, 1.0]); 3];
 /// assert_eq!(Rays::from(&list).len(), 3);
@@ -93,7 +94,8 @@ impl<'a> Rays<'a> {
 /// | anything else: x, y, z among other numbers | `Column::new(values, stride)` |
 ///
 /// ```
-/// use antumbra::{Column, RayColumns};
+/// use antumbra::RayColumns;
+/// use antumbra::inputs::Column;
 ///
 /// // Positions among other numbers: x, y, z, then two of no interest.
 /// let vertices = [0.0, 0.0, 0.0, 9.0, 9.0, 1.0, 0.0, 0.0, 9.0, 9.0];
@@ -126,7 +128,8 @@ impl<'a> Column<'a> {
     /// Column of vectors whose coordinates lie in an array each, as in the packets of other kernels.
     ///
     /// ```
-    /// use antumbra::{Column, RayColumns};
+    /// use antumbra::RayColumns;
+    /// use antumbra::inputs::Column;
     ///
     /// let (x, y, z) = ([0.0, 1.0], [2.0, 3.0], [4.0, 5.0]);
     /// let rays = RayColumns::new(2, Column::of_axes(&x, &y, &z), &[0.0, 0.0, 1.0])?;

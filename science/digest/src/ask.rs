@@ -2,9 +2,10 @@
 //!
 //! Names of questions are words of the digest, and stay when what they call is renamed.
 
+use antumbra::inputs::Column;
 use antumbra::{
-    Batch, Bvh, ClosestPoint, Column, Directions, Hit, Isa, PrimId, Ray, RayColumns, RayOrder,
-    RayQuery, Surface, Visit,
+    Batch, Bvh, ClosestPoint, Directions, Hit, Isa, PrimId, Ray, RayColumns, RayOrder, RayQuery,
+    Surface, Visit,
 };
 use xxhash_rust::xxh3::Xxh3Default;
 

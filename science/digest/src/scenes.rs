@@ -5,10 +5,8 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity, Pattern};
-use antumbra::{
-    Aabb, CurveBasis, Curves, Disk, Geometry, Instance, LocalOrigin, NestedInstances, Ray, Sphere,
-    UserGeometry, UserHit,
-};
+use antumbra::shapes::{CurveBasis, Curves, Disk, Sphere, UserGeometry, UserHit};
+use antumbra::{Aabb, Geometry, Instance, LocalOrigin, NestedInstances, Ray};
 use antumbra_scene::builtin;
 use antumbra_testkit::{Mesh, Rng, TestRay, mesh, rays};
 

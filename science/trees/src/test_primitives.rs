@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Opacity};
-use antumbra::{Geometry, Primitives, Sphere};
+use antumbra::shapes::Sphere;
+use antumbra::{Geometry, Primitives};
 use antumbra_testkit::{Mesh, Rng};
 
 #[derive(Debug)]

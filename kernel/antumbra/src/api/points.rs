@@ -84,8 +84,8 @@ impl ClosestPoint {
 /// once. So answers are the same bits for every tree, one by one and together. Partly transparent triangles count as
 /// if they were opaque. A quad is nearest where the nearer of its two triangles is, and counts once.
 ///
-/// [User geometry](crate::UserGeometry) answers by [`UserGeometry::closest_point`](crate::UserGeometry::closest_point).
-/// Queries for distances panic when they come to a primitive without it. No point is inside user geometry.
+/// User geometry answers by [`UserGeometry::closest_point`](crate::shapes::UserGeometry::closest_point). Queries for
+/// distances panic when they come to a primitive without it. No point is inside user geometry.
 ///
 /// Neighbours among many points share work: points of a grid, a curve or a surface are fastest in that order.
 impl Bvh {
@@ -114,7 +114,7 @@ impl Bvh {
     /// ```
     ///
     /// # Panics
-    /// If it comes to user geometry without [`closest_point`](crate::UserGeometry::closest_point).
+    /// If it comes to user geometry without [`closest_point`](crate::shapes::UserGeometry::closest_point).
     #[must_use]
     pub fn closest(&self, point: impl Into<[f32; 3]>, max_distance: f32) -> Option<ClosestPoint> {
         let point = point.into();
@@ -155,7 +155,8 @@ impl Bvh {
     /// Where bodies overlap, the distance is measured to the nearest surface, even if that is inside another body.
     ///
     /// ```
-    /// # use antumbra::{Bvh, Geometry, Recipe, Sphere};
+    /// # use antumbra::shapes::Sphere;
+    /// # use antumbra::{Bvh, Geometry, Recipe};
     /// let ball = [Geometry::spheres(vec![Sphere { center: [0.0; 3], radius: 2.0 }])];
     /// let bvh = Bvh::build(&ball, &Recipe::default())?;
     /// assert_eq!(bvh.signed_distance([0.0, 5.0, 0.0]), 3.0);
@@ -185,7 +186,8 @@ impl Bvh {
     /// An instance counts for points inside its box.
     ///
     /// ```
-    /// # use antumbra::{Bvh, Geometry, Recipe, Sphere};
+    /// # use antumbra::shapes::Sphere;
+    /// # use antumbra::{Bvh, Geometry, Recipe};
     /// let ball = [Geometry::spheres(vec![Sphere { center: [0.0; 3], radius: 2.0 }])];
     /// let bvh = Bvh::build(&ball, &Recipe::default())?;
     /// assert!(bvh.contains([1.0, 0.0, 0.0]) && !bvh.contains([3.0, 0.0, 0.0]));

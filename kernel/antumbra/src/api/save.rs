@@ -22,7 +22,8 @@ use crate::words::{self, Kind, Sink, Words};
 ///
 /// ```
 /// # use antumbra::{Bvh, Geometry, Recipe};
-/// use antumbra::{Error, Functions, Saved};
+/// use antumbra::Error;
+/// use antumbra::saved::{Functions, Saved};
 ///
 /// # let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
 /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
@@ -71,7 +72,8 @@ impl Functions {
     /// Reads what [`Bvh::write`], [`Object::write`] or [`World::write`] wrote, with these functions.
     ///
     /// ```
-    /// # use antumbra::{Error, Functions, World};
+    /// # use antumbra::saved::Functions;
+    /// # use antumbra::{Error, World};
     /// fn load(file: std::fs::File, functions: &Functions) -> Result<World, Error> {
     ///     functions.read(file)
     /// }

@@ -69,7 +69,7 @@ impl Bvh {
     ///
     /// A triangle's corners turn counter-clockwise if the normal points at the viewer; a mirroring instance turns it around
     /// as it does the corners. A sphere's normal points outwards. The normal of either does not depend on the side that
-    /// was hit. User geometry computes its own: [`UserGeometry::normal`](crate::UserGeometry::normal).
+    /// was hit. User geometry computes its own: [`UserGeometry::normal`](crate::shapes::UserGeometry::normal).
     ///
     /// Finds the primitive by its ids along the ray, which takes about as long as a query of one ray. `None` if the ray
     /// comes by no such primitive, if the three corners lie on a line, or if user geometry returns none. Where something moves,

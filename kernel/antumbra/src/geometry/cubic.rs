@@ -8,7 +8,7 @@ use crate::math;
 /// Meaning of the four control points of a cubic curve.
 ///
 /// ```
-/// use antumbra::{CurveBasis, Curves};
+/// use antumbra::shapes::{CurveBasis, Curves};
 ///
 /// let points = [[0.0, 0.0, 0.0, 0.01], [0.0, 0.5, 0.0, 0.01], [0.5, 1.0, 0.0, 0.01], [1.0, 1.0, 0.0, 0.01]];
 /// let through = |basis| Curves::cubic(&points, &[0], basis, 0.1).expect("four points").curves.points[0];
@@ -28,7 +28,7 @@ pub enum CurveBasis {
 /// Segments that stand for cubic curves, and where they lie on them.
 ///
 /// ```
-/// use antumbra::{CurveBasis, Curves};
+/// use antumbra::shapes::{CurveBasis, Curves};
 ///
 /// let points = [[0.0, 0.0, 0.0, 0.01], [0.0, 0.5, 0.0, 0.01], [0.5, 1.0, 0.0, 0.01], [1.0, 1.0, 0.0, 0.01]];
 /// let cubic = Curves::cubic(&points, &[0], CurveBasis::Bezier, 0.1).expect("four points");
@@ -62,7 +62,7 @@ impl Curves<'_> {
     /// Returns `None` if an index is out of range or the tolerance is not above 0.
     ///
     /// ```
-    /// use antumbra::{CurveBasis, Curves};
+    /// use antumbra::shapes::{CurveBasis, Curves};
     ///
     /// let arc = [[0.0, 0.0, 0.0, 0.01], [0.0, 0.5, 0.0, 0.01], [0.5, 1.0, 0.0, 0.01], [1.0, 1.0, 0.0, 0.01]];
     /// let cubic = Curves::cubic(&arc, &[0], CurveBasis::Bezier, 0.1).expect("four points");

@@ -44,7 +44,8 @@ use crate::ray::{Hit, Ray};
 /// two equal ends. An index beyond the last point but one is an error at build.
 ///
 /// ```
-/// use antumbra::{Bvh, Curves, Geometry, Ray, Recipe};
+/// use antumbra::shapes::Curves;
+/// use antumbra::{Bvh, Geometry, Ray, Recipe};
 ///
 /// // A blade of grass of two segments that ends in a tip.
 /// let points = vec![[0.0, 0.0, 0.0, 0.1], [0.0, 1.0, 0.0, 0.1], [0.5, 2.0, 0.0, 0.0]];

@@ -18,7 +18,8 @@ use crate::ray::{Hit, Ray};
 /// `u` and `v` of a hit are 0. [`Bvh::normal`](crate::Bvh::normal) is the normal given here, on whichever side the hit is.
 ///
 /// ```
-/// use antumbra::{Bvh, Disk, Geometry, Ray, Recipe};
+/// use antumbra::shapes::Disk;
+/// use antumbra::{Bvh, Geometry, Ray, Recipe};
 ///
 /// let disk = Disk { center: [0.0, 0.0, 1.0], normal: [0.0, 0.0, 1.0], radius: 0.5 };
 /// let bvh = Bvh::build(&[Geometry::disks(vec![disk])], &Recipe::default())?;

@@ -27,7 +27,8 @@ use crate::geometry::{Opacity, UserGeometry};
 /// ```
 /// use std::sync::Arc;
 /// use antumbra::cutout::{Candidate, Opacity};
-/// use antumbra::{Bvh, Functions, Geometry, Ray, Recipe};
+/// use antumbra::saved::Functions;
+/// use antumbra::{Bvh, Geometry, Ray, Recipe};
 ///
 /// #[derive(Debug)]
 /// struct Hole;
@@ -108,7 +109,7 @@ fn one_each<'a, F>(
 /// Name of a geometry. Sorted, the geometries of the world itself come first.
 ///
 /// ```
-/// use antumbra::GeometryId;
+/// use antumbra::saved::GeometryId;
 ///
 /// let (ground, wheel) = (GeometryId { object: None, geom_id: 5 }, GeometryId { object: Some(0), geom_id: 0 });
 /// assert!(ground < wheel);

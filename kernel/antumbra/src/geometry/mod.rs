@@ -78,7 +78,8 @@ pub const BLOCK: usize = 8;
 /// beyond the positions is an error at build.
 ///
 /// ```
-/// use antumbra::{Geometry, TriangleMesh};
+/// use antumbra::Geometry;
+/// use antumbra::shapes::TriangleMesh;
 ///
 /// let mesh = TriangleMesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], vec![[0, 1, 2]]);
 /// assert_eq!((mesh.positions.len(), mesh.indices.len()), (3, 1));
@@ -152,7 +153,8 @@ pub struct QuadMesh<'a> {
 /// A full sphere. Rays that start inside hit it from within.
 ///
 /// ```
-/// use antumbra::{Bvh, Geometry, Ray, Recipe, Sphere};
+/// use antumbra::shapes::Sphere;
+/// use antumbra::{Bvh, Geometry, Ray, Recipe};
 ///
 /// let ball = Sphere { center: [0.0, 0.0, 5.0], radius: 1.0 };
 /// let bvh = Bvh::build(&[Geometry::spheres(vec![ball])], &Recipe::default())?;
@@ -171,7 +173,8 @@ pub struct Sphere {
 /// One geometry of a scene; its place in the list given to the builder is the `geom_id`.
 ///
 /// ```
-/// use antumbra::{Bvh, Geometry, Ray, Recipe, Sphere};
+/// use antumbra::shapes::Sphere;
+/// use antumbra::{Bvh, Geometry, Ray, Recipe};
 ///
 /// let positions = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
 /// let scene = [

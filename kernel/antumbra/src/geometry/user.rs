@@ -37,7 +37,8 @@ use crate::ray::{Hit, Ray};
 ///
 /// ```
 /// use std::sync::Arc;
-/// use antumbra::{Aabb, Bvh, Geometry, Ray, Recipe, UserGeometry, UserHit};
+/// use antumbra::shapes::{UserGeometry, UserHit};
+/// use antumbra::{Aabb, Bvh, Geometry, Ray, Recipe};
 ///
 /// /// Discs at several heights that face up.
 /// #[derive(Debug)]
@@ -91,7 +92,8 @@ pub trait UserGeometry: fmt::Debug + Send + Sync {
     ///
     /// ```
     /// # use std::sync::Arc;
-    /// # use antumbra::{Aabb, Bvh, Geometry, Ray, Recipe, UserGeometry, UserHit};
+    /// # use antumbra::shapes::{UserGeometry, UserHit};
+    /// # use antumbra::{Aabb, Bvh, Geometry, Ray, Recipe};
     /// /// A point of no size, which no ray hits.
     /// #[derive(Debug)]
     /// struct Dot([f32; 3]);
@@ -142,7 +144,7 @@ const IDENTITY: [[f64; 4]; 3] = [
 /// A hit on user geometry.
 ///
 /// ```
-/// use antumbra::UserHit;
+/// use antumbra::shapes::UserHit;
 ///
 /// let hit = UserHit::new(2.5, 0.1, 0.9);
 /// assert_eq!(hit.t, 2.5);

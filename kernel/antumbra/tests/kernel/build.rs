@@ -5,7 +5,8 @@ use std::time::Duration;
 
 use crate::support::{BUILDERS, equals_brute_by, geometry, ways};
 use antumbra::recipe::{Builder, Clock, Collapse};
-use antumbra::{Bvh, Error, Geometry, Primitives, Ray, Recipe, Sphere, Width};
+use antumbra::shapes::Sphere;
+use antumbra::{Bvh, Error, Geometry, Primitives, Ray, Recipe, Width};
 use antumbra_testkit::sample::{pairs, triples};
 use antumbra_testkit::{Rng, mesh};
 

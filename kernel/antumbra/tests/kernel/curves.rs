@@ -1,8 +1,8 @@
 //! Curves: every tree against brute force, and brute force against what is known on paper.
 
+use antumbra::shapes::{CurveBasis, Curves, DropReason, Dropped, Sphere};
 use antumbra::{
-    Brute, Bvh, CurveBasis, Curves, DropReason, Dropped, Error, Geometry, Instance, Object, PrimId,
-    Primitives, Ray, Recipe, Sphere, World,
+    Brute, Bvh, Error, Geometry, Instance, Object, PrimId, Primitives, Ray, Recipe, World,
 };
 use antumbra_testkit::{Rng, mesh, rays};
 use proptest::prelude::*;

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use antumbra::shapes::{Disk, DropReason, Dropped, Sphere};
 use antumbra::{
-    Brute, Bvh, Disk, DropReason, Dropped, Error, Geometry, Hit, Instance, Masks, Object, PrimId,
-    Primitives, Ray, Recipe, Sphere, World,
+    Brute, Bvh, Error, Geometry, Hit, Instance, Masks, Object, PrimId, Primitives, Ray, Recipe,
+    World,
 };
 use antumbra_testkit::{Rng, mesh, rays};
 use proptest::prelude::*;

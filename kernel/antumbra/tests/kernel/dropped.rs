@@ -2,7 +2,8 @@
 
 use antumbra::parts::{BinaryTree, Steps, TreeLog};
 use antumbra::recipe::{Builder, Collapse};
-use antumbra::{Bvh, DropReason, Dropped, Geometry, Instance, Isa, Primitives, Sphere, Width};
+use antumbra::shapes::{DropReason, Dropped, Sphere};
+use antumbra::{Bvh, Geometry, Instance, Isa, Primitives, Width};
 use antumbra_testkit::{Rng, mesh};
 
 use crate::support::{BUILDERS, geometry};

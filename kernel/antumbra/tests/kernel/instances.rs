@@ -6,8 +6,9 @@ use crate::support::{
 use crate::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
 use antumbra::parts::{BinaryTree, Learning, Steps, TreeLog, surface_rays};
 use antumbra::recipe::{Builder, Collapse};
+use antumbra::shapes::Sphere;
 use antumbra::{
-    Brute, Bvh, Error, Geometry, Hit, INVALID_ID, Instance, Primitives, Ray, Recipe, Sphere, Width,
+    Brute, Bvh, Error, Geometry, Hit, INVALID_ID, Instance, Primitives, Ray, Recipe, Width,
 };
 use antumbra_testkit::sample::{pairs, triples};
 use antumbra_testkit::{Mesh, Rng, mesh, rays};

@@ -4,7 +4,8 @@
 use crate::support::{BUILDERS, BY_RAY, collapses, geometry, kernel_rays, ways};
 use antumbra::parts::{BinaryTree, Cost, Learning, Steps, TreeLog, surface_rays};
 use antumbra::recipe::{Builder, Collapse, CostModel, Order};
-use antumbra::{Brute, Bvh, Geometry, Isa, Primitives, Ray, Recipe, Sphere, Width};
+use antumbra::shapes::Sphere;
+use antumbra::{Brute, Bvh, Geometry, Isa, Primitives, Ray, Recipe, Width};
 use antumbra_testkit::sample::triples;
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 

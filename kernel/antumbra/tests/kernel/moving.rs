@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
+use antumbra::shapes::Sphere;
 use antumbra::{
     Brute, Build, Bvh, Directions, Error, Geometry, Instance, Masks, NestedInstances, Object,
-    PrimId, Primitives, Ray, RayOrder, Recipe, Sphere, Visit, Width, World,
+    PrimId, Primitives, Ray, RayOrder, Recipe, Visit, Width, World,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 

@@ -3,7 +3,8 @@
 
 use crate::support::{Odd, config, equals_brute, for_every_tree, geometry, kernel_rays, quads};
 use antumbra::recipe::Level;
-use antumbra::{Brute, Bvh, Geometry, Isa, Primitives, Ray, Sphere};
+use antumbra::shapes::Sphere;
+use antumbra::{Brute, Bvh, Geometry, Isa, Primitives, Ray};
 use antumbra_testkit::{Rng, mesh, rays};
 use proptest::prelude::*;
 

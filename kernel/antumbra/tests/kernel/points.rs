@@ -4,8 +4,9 @@ use crate::instances::Scene;
 use crate::support::{TWICE, config, for_every_tree, geometry};
 use crate::transforms::{Transform, rotation, transform};
 use antumbra::recipe::Builder;
+use antumbra::shapes::Sphere;
 use antumbra::{
-    Brute, Bvh, ClosestPoint, Geometry, INVALID_ID, Instance, Primitives, Recipe, Sphere, World,
+    Brute, Bvh, ClosestPoint, Geometry, INVALID_ID, Instance, Primitives, Recipe, World,
 };
 use antumbra_testkit::{Mesh, Rng, mesh};
 use proptest::prelude::*;

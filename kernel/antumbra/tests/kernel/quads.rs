@@ -1,9 +1,7 @@
 //! Quads: the same hits as those of their triangles, with other names. Scenes of other tests have them, too.
 
-use antumbra::{
-    Brute, Bvh, DropReason, Dropped, Error, Geometry, Hit, Instance, PrimId, Primitives, Ray,
-    Recipe,
-};
+use antumbra::shapes::{DropReason, Dropped};
+use antumbra::{Brute, Bvh, Error, Geometry, Hit, Instance, PrimId, Primitives, Ray, Recipe};
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
 

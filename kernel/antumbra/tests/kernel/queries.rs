@@ -5,10 +5,12 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, ThreadId};
 
 use antumbra::cutout::{Candidate, Opacity};
+use antumbra::inputs::{Column, Distance};
 use antumbra::recipe::Order;
+use antumbra::shapes::Sphere;
 use antumbra::{
-    Bvh, Column, Distance, Error, Geometry, Hit, INVALID_ID, Instance, Primitives, Ray, RayColumns,
-    RayOrder, Recipe, Sphere, Width,
+    Bvh, Error, Geometry, Hit, INVALID_ID, Instance, Primitives, Ray, RayColumns, RayOrder, Recipe,
+    Width,
 };
 use antumbra_testkit::{Rng, mesh, rays};
 

@@ -7,7 +7,8 @@ use crate::support::{
     ways,
 };
 use antumbra::recipe::Collapse;
-use antumbra::{Bvh, Error, Geometry, Instance, Primitives, Recipe, Sphere};
+use antumbra::shapes::Sphere;
+use antumbra::{Bvh, Error, Geometry, Instance, Primitives, Recipe};
 use antumbra_testkit::sample::triples;
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;

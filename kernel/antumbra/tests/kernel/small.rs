@@ -4,7 +4,8 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity};
-use antumbra::{Geometry, Instance, Primitives, Sphere};
+use antumbra::shapes::Sphere;
+use antumbra::{Geometry, Instance, Primitives};
 use antumbra_testkit::{Rng, mesh, rays};
 
 use crate::support::{Odd, equals_brute, kernel_rays, quads};

@@ -8,9 +8,9 @@ use antumbra::parts::{
     TreeLog, binned_subtree,
 };
 use antumbra::recipe::{Builder, Collapse, CostModel, Order, Preset};
+use antumbra::shapes::{UserGeometry, UserHit};
 use antumbra::{
-    Aabb, Brute, Build, Bvh, Error, Geometry, Hit, Isa, Primitives, Ray, Recipe, UserGeometry,
-    UserHit, Width,
+    Aabb, Brute, Build, Bvh, Error, Geometry, Hit, Isa, Primitives, Ray, Recipe, Width,
 };
 use antumbra_testkit::sample::{self, pairs, triples};
 use antumbra_testkit::{Mesh, Rng, TestRay};

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
+use antumbra::shapes::{DropReason, Dropped, Sphere, UserGeometry, UserHit};
 use antumbra::{
-    Aabb, Brute, Bvh, DropReason, Dropped, Geometry, Instance, Object, PrimId, Primitives, Ray,
-    Recipe, Sphere, UserGeometry, UserHit, Width, World,
+    Aabb, Brute, Bvh, Geometry, Instance, Object, PrimId, Primitives, Ray, Recipe, Width, World,
 };
 use antumbra_testkit::{Rng, mesh, rays};
 

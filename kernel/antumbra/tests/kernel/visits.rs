@@ -4,9 +4,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use antumbra::cutout::{Candidate, Opacity, QueryKind};
+use antumbra::shapes::Sphere;
 use antumbra::{
     Brute, Bvh, Geometry, Hit, INVALID_ID, Instance, PrimId, Primitives, Ray, RayOrder, Recipe,
-    Sphere, Visit,
+    Visit,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;

@@ -7,10 +7,9 @@ use crate::support::{Stripes, bits, config, cutouts, geometry, orders, square};
 use crate::transforms::{IDENTITY, transform, translation};
 use antumbra::parts::{Cost, Steps};
 use antumbra::recipe::{Builder, Preset};
-use antumbra::{
-    Bvh, Error, Functions, Geometry, Instance, Object, Primitives, Ray, Recipe, Saved,
-    UserGeometry, Width, World,
-};
+use antumbra::saved::{Functions, Saved};
+use antumbra::shapes::UserGeometry;
+use antumbra::{Bvh, Error, Geometry, Instance, Object, Primitives, Ray, Recipe, Width, World};
 use antumbra_testkit::Rng;
 use antumbra_testkit::mesh::{self, Mesh};
 use proptest::prelude::*;

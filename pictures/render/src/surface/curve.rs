@@ -23,9 +23,9 @@ const TOLERANCE: f32 = 0.1;
 const CLEARANCE: f32 = 1.25;
 
 /// Curves as the kernel takes them, and the part of each segment.
-pub fn segments(curves: &Curves) -> (antumbra::Curves<'static>, Vec<CurvePart>) {
-    let basis = antumbra::CurveBasis::Bezier;
-    let cubic = antumbra::Curves::cubic(&curves.points, &curves.first, basis, TOLERANCE);
+pub fn segments(curves: &Curves) -> (antumbra::shapes::Curves<'static>, Vec<CurvePart>) {
+    let basis = antumbra::shapes::CurveBasis::Bezier;
+    let cubic = antumbra::shapes::Curves::cubic(&curves.points, &curves.first, basis, TOLERANCE);
     cubic.map_or_else(Default::default, |cubic| (cubic.curves, cubic.parts))
 }
 

@@ -3,7 +3,8 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use antumbra::{Primitives, Sphere};
+use antumbra::Primitives;
+use antumbra::shapes::Sphere;
 use antumbra_scene::{Geometry, Instance, Scene, Shape};
 use glam::Affine3;
 

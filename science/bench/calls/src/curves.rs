@@ -2,7 +2,8 @@
 
 use std::cell::RefCell;
 
-use antumbra::{Bvh, Curves, Error, Geometry, Ray, Recipe};
+use antumbra::shapes::Curves;
+use antumbra::{Bvh, Error, Geometry, Ray, Recipe};
 use antumbra_testkit::Rng;
 
 use crate::embree::Embree;

@@ -2,7 +2,8 @@
 
 use std::cell::RefCell;
 
-use antumbra::{Bvh, Column, Ray, RayColumns};
+use antumbra::inputs::Column;
+use antumbra::{Bvh, Ray, RayColumns};
 
 use crate::embree::Embree;
 use crate::turns::{Work, medians};

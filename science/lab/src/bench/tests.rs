@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Opacity, QueryKind};
-use antumbra::{Bvh, Geometry, Instance, Isa, Ray, Recipe, TriangleMesh, Width};
+use antumbra::shapes::TriangleMesh;
+use antumbra::{Bvh, Geometry, Instance, Isa, Ray, Recipe, Width};
 use antumbra_render::Lowered;
 
 use super::embree::{self, Device, Embree, Scene};

@@ -22,7 +22,7 @@ fn kernel_geometry(geometry: &Geometry) -> antumbra::Geometry<'_> {
         Geometry::Mesh(mesh) => {
             antumbra::Geometry::triangles(&mesh.positions[..], &mesh.indices[..])
         }
-        Geometry::Sphere(sphere) => antumbra::Geometry::spheres(vec![antumbra::Sphere {
+        Geometry::Sphere(sphere) => antumbra::Geometry::spheres(vec![antumbra::shapes::Sphere {
             center: sphere.center.to_array(),
             radius: sphere.radius,
         }]),

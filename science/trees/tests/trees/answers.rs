@@ -5,7 +5,8 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Opacity};
-use antumbra::{Brute, Bvh, Geometry, Hit, Instance, Isa, Primitives, Ray, Recipe, Sphere, Width};
+use antumbra::shapes::Sphere;
+use antumbra::{Brute, Bvh, Geometry, Hit, Instance, Isa, Primitives, Ray, Recipe, Width};
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS};
 

@@ -5,7 +5,8 @@ use core::fmt;
 /// Something that was given and is not among the primitives.
 ///
 /// ```
-/// use antumbra::{DropReason, Dropped, Geometry, Primitives};
+/// use antumbra::shapes::{DropReason, Dropped};
+/// use antumbra::{Geometry, Primitives};
 ///
 /// let flat = [Geometry::triangles(vec![[0.0; 3]; 3], vec![[0, 1, 2]])];
 /// let primitives = Primitives::new(&flat)?;
@@ -42,7 +43,7 @@ pub enum Dropped {
 /// Reason for which something was dropped.
 ///
 /// ```
-/// use antumbra::DropReason;
+/// use antumbra::shapes::DropReason;
 ///
 /// assert_eq!(DropReason::NoNormal.to_string(), "the normal is zero");
 /// ```

@@ -4,7 +4,8 @@ use std::io::{self, Read};
 use std::sync::Arc;
 
 use antumbra::recipe::Order;
-use antumbra::{Bvh, Error, Functions, Instance, Object, Ray, Recipe, Saved, Width, World};
+use antumbra::saved::{Functions, Saved};
+use antumbra::{Bvh, Error, Instance, Object, Ray, Recipe, Width, World};
 use antumbra_testkit::{Rng, mesh};
 
 use super::{Scene, VERSION, Wary, counts, saved, scene};

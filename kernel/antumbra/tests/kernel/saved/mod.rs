@@ -10,9 +10,10 @@ use std::sync::Arc;
 use antumbra::cutout::Opacity;
 use antumbra::parts::{Cost, Steps};
 use antumbra::recipe::{Builder, Order};
+use antumbra::saved::{Functions, GeometryId, Saved};
+use antumbra::shapes::{Curves, Sphere, UserGeometry, UserHit};
 use antumbra::{
-    Aabb, Brute, Bvh, Curves, Error, Functions, Geometry, GeometryId, Instance, Isa, Object,
-    Primitives, Ray, Recipe, Saved, Sphere, UserGeometry, UserHit, Width, World,
+    Aabb, Brute, Bvh, Error, Geometry, Instance, Isa, Object, Primitives, Ray, Recipe, Width, World,
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 

@@ -4,7 +4,7 @@ use std::ffi::c_uint;
 use std::sync::Arc;
 use std::time::Instant;
 
-use antumbra::TriangleMesh;
+use antumbra::shapes::TriangleMesh;
 
 use super::scene::{FLAG_DYNAMIC, FlushDenormals, Part, QUALITY_LOW, QUALITY_REFIT, VERTEX_BUFFER};
 use super::{Device, Handle, RayHit, SingleRay};

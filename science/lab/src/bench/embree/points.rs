@@ -2,7 +2,7 @@
 
 use std::ffi::{c_uint, c_void};
 
-use antumbra::TriangleMesh;
+use antumbra::shapes::TriangleMesh;
 
 use super::Scene;
 

@@ -2,7 +2,8 @@
 
 use std::ffi::{c_int, c_uint};
 
-use antumbra::{Ray, UserHit};
+use antumbra::Ray;
+use antumbra::shapes::UserHit;
 
 /// Every ray sees every geometry.
 const ALL_GEOMETRY: c_uint = c_uint::MAX;

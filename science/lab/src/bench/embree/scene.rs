@@ -5,7 +5,8 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::Instant;
 
-use antumbra::{Geometry as Shape, QuadMesh, TriangleMesh};
+use antumbra::Geometry as Shape;
+use antumbra::shapes::{QuadMesh, TriangleMesh};
 use antumbra_render::Lowered;
 
 use super::filter::{self, Filter};

@@ -3,7 +3,7 @@
 use std::ffi::{c_int, c_uint, c_void};
 use std::sync::Arc;
 
-use antumbra::UserGeometry;
+use antumbra::shapes::UserGeometry;
 
 use super::{RayHit, SingleRay};
 

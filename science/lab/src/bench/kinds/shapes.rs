@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Opacity};
-use antumbra::{Aabb, Geometry, Ray, TriangleMesh, UserGeometry, UserHit};
+use antumbra::shapes::{TriangleMesh, UserGeometry, UserHit};
+use antumbra::{Aabb, Geometry, Ray};
 use antumbra_render::Lowered;
 
 /// All meshes of a world as one.

@@ -8,7 +8,8 @@ use crate::builders::ray_driven::*;
 use crate::test_primitives::primitives;
 use antumbra::parts::{RaySetup, SplitCost as Cost, surface_rays};
 use antumbra::recipe::Builder;
-use antumbra::{Brute, Geometry, Instance, Ray, Sphere};
+use antumbra::shapes::Sphere;
+use antumbra::{Brute, Geometry, Instance, Ray};
 use antumbra_testkit::{Mesh, Rng, mesh};
 
 /// Everything a side of a split is said to have is counted again, ray by ray and primitive by primitive.
