@@ -210,9 +210,7 @@ impl<'a> Batch<'a> {
     /// Whether anything lies in the interval of each ray: item `i` answers ray `i`.
     #[must_use]
     pub fn occluded(self) -> Vec<bool> {
-        let mut occluded = vec![false; self.rays.len()];
-        self.occluded_into(&mut occluded);
-        occluded
+        filled(self.rays.len(), false, |found| self.occluded_into(found))
     }
 
     /// [`Batch::occluded`] into a slice.
@@ -259,9 +257,7 @@ impl<'a> Batch<'a> {
     /// wins.
     #[must_use]
     pub fn intersect(self) -> Vec<Option<Hit>> {
-        let mut hits = vec![None; self.rays.len()];
-        self.intersect_into(&mut hits);
-        hits
+        filled(self.rays.len(), None, |found| self.intersect_into(found))
     }
 
     /// [`Batch::intersect`] into a slice.
@@ -295,9 +291,7 @@ impl<'a> Batch<'a> {
     /// leaf of the hit, which is in the cache. The call takes about 1.25 times as long as [`Batch::intersect`].
     #[must_use]
     pub fn surfaces(self) -> Vec<Option<Surface>> {
-        let mut surfaces = vec![None; self.rays.len()];
-        self.surfaces_into(&mut surfaces);
-        surfaces
+        filled(self.rays.len(), None, |found| self.surfaces_into(found))
     }
 
     /// [`Batch::surfaces`] into a slice.
@@ -323,9 +317,7 @@ impl<'a> Batch<'a> {
     /// times as long as [`Batch::occluded`].
     #[must_use]
     pub fn occluders(self) -> Vec<Option<PrimId>> {
-        let mut occluders = vec![None; self.rays.len()];
-        self.occluders_into(&mut occluders);
-        occluders
+        filled(self.rays.len(), None, |found| self.occluders_into(found))
     }
 
     /// [`Batch::occluders`] into a slice.
@@ -507,6 +499,13 @@ impl<'a> Batch<'a> {
         }
         memory.rays = rays;
     }
+}
+
+/// A list that `fill` fills.
+pub(super) fn filled<A: Clone>(len: usize, empty: A, fill: impl FnOnce(&mut [A])) -> Vec<A> {
+    let mut answers = vec![empty; len];
+    fill(&mut answers);
+    answers
 }
 
 impl fmt::Debug for Batch<'_> {

@@ -1,10 +1,10 @@
 //! Queries about points: what is nearest, what is within a distance, what is inside, and how deep.
 
-use alloc::vec;
 use alloc::vec::Vec;
 
 use antumbra_simd::Dispatch;
 
+use super::batch::filled;
 use super::bvh::Bvh;
 use crate::geometry::instance::dot;
 use crate::geometry::nearest::minus;
@@ -268,9 +268,7 @@ impl<'a> Points<'a> {
     /// As [`Bvh::closest`].
     #[must_use]
     pub fn closest(self) -> Vec<Option<ClosestPoint>> {
-        let mut closest = vec![None; self.points.len()];
-        self.closest_into(&mut closest);
-        closest
+        filled(self.points.len(), None, |found| self.closest_into(found))
     }
 
     /// [`Points::closest`] into a slice.
@@ -287,19 +285,16 @@ impl<'a> Points<'a> {
     /// As [`Bvh::closest`].
     #[must_use]
     pub fn all(self) -> Vec<Vec<ClosestPoint>> {
-        let mut found = vec![Vec::new(); self.points.len()];
-        each(self.points, &mut found, |index, point| {
-            self.bvh.within(point, self.limits.get(index))
-        });
-        found
+        let within = |index, point| self.bvh.within(point, self.limits.get(index));
+        filled(self.points.len(), Vec::new(), |found| {
+            each(self.points, found, within)
+        })
     }
 
     /// [`Bvh::contains`] of each point.
     #[must_use]
     pub fn inside(self) -> Vec<bool> {
-        let mut inside = vec![false; self.points.len()];
-        self.inside_into(&mut inside);
-        inside
+        filled(self.points.len(), false, |found| self.inside_into(found))
     }
 
     /// [`Points::inside`] into a slice.
@@ -316,9 +311,9 @@ impl<'a> Points<'a> {
     /// As [`Bvh::closest`].
     #[must_use]
     pub fn signed_distances(self) -> Vec<f32> {
-        let mut distances = vec![0.0; self.points.len()];
-        self.signed_distances_into(&mut distances);
-        distances
+        filled(self.points.len(), 0.0, |found| {
+            self.signed_distances_into(found)
+        })
     }
 
     /// [`Points::signed_distances`] into a slice.
