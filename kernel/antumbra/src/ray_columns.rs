@@ -27,21 +27,10 @@ pub enum Rays<'a> {
     Columns(RayColumns<'a>),
 }
 
-impl<'a> From<&'a [Ray]> for Rays<'a> {
-    fn from(rays: &'a [Ray]) -> Self {
-        Self::List(rays)
-    }
-}
-
-impl<'a> From<&'a Vec<Ray>> for Rays<'a> {
-    fn from(rays: &'a Vec<Ray>) -> Self {
-        Self::List(rays)
-    }
-}
-
-impl<'a, const N: usize> From<&'a [Ray; N]> for Rays<'a> {
-    fn from(rays: &'a [Ray; N]) -> Self {
-        Self::List(rays)
+/// Slices, arrays, vectors and whatever else is a list of rays.
+impl<'a, R: AsRef<[Ray]> + ?Sized> From<&'a R> for Rays<'a> {
+    fn from(rays: &'a R) -> Self {
+        Self::List(rays.as_ref())
     }
 }
 
@@ -228,15 +217,10 @@ impl From<f32> for Distance<'_> {
     }
 }
 
-impl<'a> From<&'a [f32]> for Distance<'a> {
-    fn from(distances: &'a [f32]) -> Self {
-        Self::Each(distances.into())
-    }
-}
-
-impl<'a> From<&'a Vec<f32>> for Distance<'a> {
-    fn from(distances: &'a Vec<f32>) -> Self {
-        Self::Each(distances.as_slice().into())
+/// Slices, arrays, vectors and whatever else is a list of numbers.
+impl<'a, N: AsRef<[f32]> + ?Sized> From<&'a N> for Distance<'a> {
+    fn from(distances: &'a N) -> Self {
+        Self::Each(distances.as_ref().into())
     }
 }
 
