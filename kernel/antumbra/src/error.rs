@@ -356,6 +356,14 @@ impl From<std::io::Error> for Error {
 }
 
 impl Error {
+    /// Fails if something moves where nothing may.
+    pub(crate) fn if_moves(moves: bool, why: &'static str) -> Result<(), Self> {
+        match moves {
+            true => Err(Self::Moves(why)),
+            false => Ok(()),
+        }
+    }
+
     /// Fails unless what was made for a tree of shape `found` fits a tree of shape `tree`.
     pub(crate) fn unless_fits(found: Shape, tree: Shape) -> Result<(), Self> {
         if found == tree {

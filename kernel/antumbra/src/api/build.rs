@@ -141,10 +141,8 @@ impl<'a> Build<'a> {
     /// [`Error::Moves`] if something moves.
     pub fn object(self) -> Result<Object, Error> {
         let primitives = self.primitives()?;
-        stands_still(
-            &primitives,
-            "an object cannot move inside, but its instances can",
-        )?;
+        let why = "an object cannot move inside, but its instances can";
+        Error::if_moves(primitives.moves(), why)?;
         if !primitives.instances.is_empty() {
             return Err(Error::HasInstances);
         }
@@ -159,7 +157,10 @@ impl<'a> Build<'a> {
     /// [`Primitives::middle`] of every span.
     pub fn stage(self) -> Result<Stage, Error> {
         let primitives = self.primitives()?;
-        stands_still(&primitives, "a stage makes trees of what stands still")?;
+        Error::if_moves(
+            primitives.moves(),
+            "a stage makes trees of what stands still",
+        )?;
         let binary = BinaryStage::new(&primitives, self.rays, &self.recipe, self.monitor)?;
         Ok(Stage::new(primitives, binary))
     }
@@ -202,13 +203,6 @@ impl<'a> Build<'a> {
             )
         });
         Bvh::moving(primitives, trees.collect::<Result<_, _>>()?)
-    }
-}
-
-fn stands_still(primitives: &Primitives, why: &'static str) -> Result<(), Error> {
-    match primitives.moves() {
-        true => Err(Error::Moves(why)),
-        false => Ok(()),
     }
 }
 

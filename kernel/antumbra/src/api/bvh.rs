@@ -89,11 +89,6 @@ impl Bvh {
         }
     }
 
-    /// A tree that nothing has joined yet.
-    pub(crate) fn over_nothing(tree: Tree, isa: Isa) -> Self {
-        Self::fresh(tree, isa, &Primitives::default())
-    }
-
     /// Largest number of children of a node: 4, 8 or 16.
     #[must_use]
     pub fn width(&self) -> Width {

@@ -96,14 +96,6 @@ impl Bvh {
             share: Some(share),
         }
     }
-
-    /// Fails if the tree moves.
-    pub(super) fn stands_still(&self, why: &'static str) -> Result<(), Error> {
-        match self.moves() {
-            true => Err(Error::Moves(why)),
-            false => Ok(()),
-        }
-    }
 }
 
 /// A tree, and the share of its span at which a ray looks, if it moves: queries of one ray.

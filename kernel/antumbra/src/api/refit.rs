@@ -40,7 +40,7 @@ impl Bvh {
     /// - the tree or one of the geometries moves while rays are traced: [`Error::Moves`],
     /// - the tree has instances: [`Error::HasInstances`]; a [`World`](crate::World) refits its objects.
     pub fn refit(&mut self, geometries: &[Geometry<'_>]) -> Result<(), Error> {
-        self.stands_still("a tree that moves cannot be refitted")?;
+        Error::if_moves(self.moves(), "a tree that moves cannot be refitted")?;
         if !self.tree.roots.is_empty() {
             return Err(Error::HasInstances);
         }

@@ -54,7 +54,7 @@ const UNSAVED: &str = "a tree that moves cannot be saved";
 
 #[cfg(feature = "std")]
 fn write(saved: &impl Contents, out: impl Write) -> Result<(), Error> {
-    saved.tree().stands_still(UNSAVED)?;
+    Error::if_moves(saved.tree().moves(), UNSAVED)?;
     words::write(kind_of(saved), out, |sink| saved.write_words(sink))
 }
 

@@ -61,10 +61,8 @@ impl<'a> Geometry<'a> {
 
     /// Fails if the geometry moves where nothing may.
     pub(crate) fn stands_still(&self, why: &'static str) -> Result<(), Error> {
-        match self {
-            Self::Triangles(mesh) if !mesh.moves_to.is_empty() => Err(Error::Moves(why)),
-            _ => Ok(()),
-        }
+        let moves = matches!(self, Self::Triangles(mesh) if !mesh.moves_to.is_empty());
+        Error::if_moves(moves, why)
     }
 }
 
@@ -163,10 +161,7 @@ impl Instance {
 
     /// Fails if the instance moves where nothing may.
     pub(crate) fn stands_still(&self, why: &'static str) -> Result<(), Error> {
-        match self.moves_to.is_empty() {
-            true => Ok(()),
-            false => Err(Error::Moves(why)),
-        }
+        Error::if_moves(!self.moves_to.is_empty(), why)
     }
 
     /// The transform at the start of a span.

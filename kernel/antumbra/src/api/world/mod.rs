@@ -20,7 +20,7 @@ use crate::error::Error;
 use crate::geometry::instance::{ObjectShape, Placement};
 use crate::geometry::masks::Masks;
 use crate::geometry::moved::Moved;
-use crate::geometry::primitives::MAX_INSTANCES;
+use crate::geometry::primitives::{MAX_INSTANCES, Primitives};
 use crate::geometry::{Geometry, Instance};
 use crate::parallel::map;
 use crate::tree::node::Child;
@@ -217,7 +217,7 @@ impl World {
         let trees: Vec<_> = trees.map(|object| &object.tree).collect();
         let tree = Tree::with_room_for(width, &trees);
         let mut world = Self {
-            bvh: Bvh::over_nothing(tree, isa),
+            bvh: Bvh::fresh(tree, isa, &Primitives::default()),
             objects: Vec::new(),
             ground: Ground::default(),
             instances: Vec::new(),
