@@ -189,8 +189,7 @@ impl Sensors {
             Ray::new(above(&bounds, point, normal), normal.map(|x| -x as f32))
         });
         let rays: Vec<Ray> = rays.collect();
-        let mut hits = vec![None; rays.len()];
-        bvh.batch(&rays).intersect_into(&mut hits);
+        let hits = bvh.batch(&rays).intersect();
         let found = rays.iter().zip(hits).map(|(ray, hit)| {
             let hit = hit?;
             // A ray that leaves by a gap of its own surface hits another one at a slant.

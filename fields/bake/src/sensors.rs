@@ -123,8 +123,7 @@ impl Sensors {
         for first in (0..width * height).step_by(CELLS) {
             let range = first..(first + CELLS).min(width * height);
             let rays: Vec<Ray> = range.clone().map(ray).collect();
-            let mut hits = vec![None; rays.len()];
-            bvh.batch(&rays).intersect_into(&mut hits);
+            let hits = bvh.batch(&rays).intersect();
             memory::grow(&mut points, "sensors", rays.len())?;
             memory::grow(&mut normals, "sensors", rays.len())?;
             memory::grow(&mut cells, "sensors", rays.len())?;

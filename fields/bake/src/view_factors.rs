@@ -86,8 +86,7 @@ impl<'a> ViewFactorJob<'a> {
         let counts = firsts.par_iter().map(|&first| {
             let last = (first + RAYS).min(samples);
             let rays: Vec<Ray> = (first..last).map(|index| emitter.ray(index)).collect();
-            let mut hits = vec![None; rays.len()];
-            bvh.batch(&rays).intersect_into(&mut hits);
+            let hits = bvh.batch(&rays).intersect();
             let mut counts = vec![0_u64; width];
             for hit in hits {
                 let surface = hit.and_then(|hit| self.of_prim.get(hit.prim_id as usize));

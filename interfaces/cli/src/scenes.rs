@@ -401,8 +401,7 @@ pub fn warn_of_nothing(scene: &Scene, world: &World, isa: Isa) {
     let sees = (y0..y1).any(|y| {
         let row = (x0..x1).map(|x| camera.ray([x as f32 + 0.5, y as f32 + 0.5], [0.5; 2]));
         let rays: Vec<Ray> = row.collect();
-        let mut hits = vec![None; rays.len()];
-        bvh.batch(&rays).intersect_into(&mut hits);
+        let hits = bvh.batch(&rays).intersect();
         hits.iter().any(Option::is_some)
     });
     if !sees {

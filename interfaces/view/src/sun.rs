@@ -96,8 +96,7 @@ impl Sights {
         let faces = |sight: &Option<Sight>| sight.and_then(|sight| ray(bvh, &sight, sun));
         let rays: Vec<Option<Ray>> = self.pixels.par_iter().map(faces).collect();
         let known: Vec<Ray> = rays.iter().copied().flatten().collect();
-        let mut occluded = vec![false; known.len()];
-        bvh.batch(&known).occluded_into(&mut occluded);
+        let occluded = bvh.batch(&known).occluded();
         let mut answers = occluded.iter();
         for (value, ray) in values.iter_mut().zip(&rays) {
             if ray.is_some() && answers.next() == Some(&false) {

@@ -45,8 +45,7 @@ impl View {
             let (columns, rays): (Vec<i32>, Vec<_>) = samples
                 .map(|(x, film)| (x, camera.ray(film, [0.5; 2])))
                 .unzip();
-            let mut hits = vec![None; rays.len()];
-            ground.bvh.batch(&rays).intersect_into(&mut hits);
+            let hits = ground.bvh.batch(&rays).intersect();
             for ((ray, hit), x) in rays.iter().zip(&hits).zip(columns) {
                 let Some(hit) = hit else { continue };
                 let Some(normal) = ground.bvh.normal(ray, hit) else {

@@ -266,8 +266,7 @@ impl<'a> Bench<'a> {
 impl Reference {
     fn new(world: &World, kind: Kind, width: Width, isa: Isa, rays: &[Ray]) -> Self {
         let bvh = world.bvh(width, isa);
-        let mut answers = vec![false; rays.len()];
-        bvh.batch(rays).occluded_into(&mut answers);
+        let answers = bvh.batch(rays).occluded();
         Self {
             kind,
             width,
