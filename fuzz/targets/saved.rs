@@ -139,7 +139,7 @@ fuzz_target!(|bytes: &[u8]| {
                 let bytes = world.to_bytes();
                 let again: World = functions.from_bytes(&bytes).expect("a file of ours");
                 assert_eq!(again.to_bytes(), bytes);
-                let mut moved: Vec<_> = world.instances().iter().take(64).copied().collect();
+                let mut moved: Vec<_> = world.instances().iter().take(64).cloned().collect();
                 moved.reverse();
                 moved.extend(moved.clone());
                 if world.set_instances(&moved).is_ok() {
