@@ -10,7 +10,7 @@ use antumbra::{
     Aabb, Brute, Build, Bvh, Geometry, Hit, Instance, Isa, Masks, Object, PrimId, Primitives, Ray,
     RayQuery, Recipe, Width, World,
 };
-use antumbra_trees::{BUILDERS, ORDERS};
+use antumbra_trees::{BUILDERS, ORDERS, engine};
 use libfuzzer_sys::fuzz_target;
 
 /// What the input says, byte by byte; zeros when it has said everything.
@@ -312,12 +312,12 @@ fuzz_target!(|bytes: &[u8]| {
     let build = Build::new(&primitives).rays(&rays).recipe(&recipe);
     let stage = build.stage().expect("nobody stops it");
     for width in Width::ALL {
-        let learned = stage.learn(&rays, &recipe.width(width), &());
+        let learned = stage.learn(&rays, &recipe.engine(engine(Isa::best(), width)), &());
         let mut bvh = learned.expect("nobody stops it");
         bvh.validate().expect("a sound tree");
         bvh.set_masks(masks.clone());
         for isa in Isa::available() {
-            bvh.set_isa(isa);
+            engine(isa, width).run(&mut bvh).expect("its width");
             let mut found_occluded = vec![false; rays.len()];
             let mut found_hits = vec![None; rays.len()];
             bvh.batch(&rays).occluded_into(&mut found_occluded);

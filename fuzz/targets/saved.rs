@@ -4,9 +4,10 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Opacity};
+use antumbra::recipe::Engine;
 use antumbra::saved::{Functions, Saved};
 use antumbra::shapes::{UserGeometry, UserHit};
-use antumbra::{Aabb, Bvh, Instance, Isa, Object, Ray, World};
+use antumbra::{Aabb, Bvh, Instance, Object, Ray, World};
 use libfuzzer_sys::fuzz_target;
 
 fn mixed(z: u64) -> u64 {
@@ -104,8 +105,9 @@ fn ask(mut bvh: Bvh) {
         .chain((0..8).map(|index| Ray::new([0.1, 0.2, 0.3], corner(index))))
         .collect();
     let mut expected = None;
-    for isa in Isa::available() {
-        bvh.set_isa(isa);
+    let width = bvh.width();
+    for engine in Engine::all().filter(|engine| engine.width() == width) {
+        engine.run(&mut bvh).expect("its width");
         let mut occluded = vec![false; rays.len()];
         let mut hits = vec![None; rays.len()];
         bvh.batch(&rays).occluded_into(&mut occluded);

@@ -428,7 +428,11 @@ mod tests {
                 *normal = rng.direction();
             }
             for (choice, width) in choices.iter().zip(Width::ALL) {
-                let bvh = Bvh::build(&primitives, &Recipe::default().width(width)).expect("a tree");
+                let bvh = Bvh::build(
+                    &primitives,
+                    &Recipe::default().engine(antumbra::recipe::Engine::best(width)),
+                )
+                .expect("a tree");
                 let &(samples, distance, two_sided, weighting) = choice;
                 let options = AmbientOcclusion {
                     samples,

@@ -487,7 +487,8 @@ typedef struct antumbra_recipe {
     const char *order;
     /* Instruction set of queries: "avx512", "avx2", "neon", "scalar". NULL: the best one of this CPU. */
     const char *level;
-    /* Children per node: 4, 8 or 16; 0 for what suits the instruction set. */
+    /* Children per node: 4, 8 or 16; 0 for what suits the instruction set. Levels with vectors have no other: 8 on `avx2`, 16 on
+     * `avx512`, 4 on `neon`. `scalar` has all. */
     uint32_t width;
     /* ANTUMBRA_TRAINING_..., or ANTUMBRA_AUTO. */
     uint32_t training;

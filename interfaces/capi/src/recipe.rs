@@ -4,7 +4,7 @@ use std::ffi::c_char;
 use std::fmt::Display;
 use std::str::FromStr;
 
-use antumbra::recipe::{Builder, Collapse, CostModel, Level, Order, Preset, TrainingRays};
+use antumbra::recipe::{Builder, Collapse, CostModel, Engine, Level, Order, Preset, TrainingRays};
 use antumbra::{Isa, Recipe, Width};
 
 use crate::arrays::{Slot, Versioned, sized, text};
@@ -101,7 +101,9 @@ impl RecipeChoices {
         }
         if choices.width != 0 {
             let width = Width::from_lanes(choices.width as usize);
-            recipe.width = width.ok_or_else(|| unknown(choices.width, "recipe->width"))?;
+            let width = width.ok_or_else(|| unknown(choices.width, "recipe->width"))?;
+            let engine = Engine::new(recipe.engine.isa(), width);
+            recipe.engine = engine.map_err(Failure::argument)?;
         }
         match choices.training {
             AUTO => {}

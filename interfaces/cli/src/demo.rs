@@ -118,7 +118,7 @@ pub fn run(memory: MemorySize) -> Result<(), Failure> {
     )?;
     let document = Document {
         schema: "antumbra.demonstration/1",
-        machine: version::machine(options.recipe.isa),
+        machine: version::machine(options.recipe.engine.isa()),
         scene: SCENE,
         triangles: scene.triangle_count(),
         resolution: RESOLUTION,

@@ -155,7 +155,7 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
     let (mut dropped, mut primitives, mut bounds) = (0, 0, None);
     for width in Width::ALL {
         let start = Instant::now();
-        let bvh = world.bvh(width, isa);
+        let bvh = world.bvh(antumbra_trees::engine(isa, width));
         let seconds = start.elapsed().as_secs_f64();
         let report = bvh.report();
         (dropped, primitives) = (report.dropped, report.primitives);

@@ -38,7 +38,7 @@ fn channels(
     options: &Options,
 ) -> Result<Vec<Channel>, Failure> {
     let spp = rendering.stats.spp;
-    let isa = options.recipe.isa;
+    let isa = options.recipe.engine.isa();
     let samples = [spp, MOST_SAMPLES];
     let layers = Layers::trace(world, isa, samples, options.texture_spp, options.seed)?;
     let mut channels = Vec::new();

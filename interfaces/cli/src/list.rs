@@ -80,7 +80,7 @@ fn entries(list: ListName) -> Vec<Entry> {
         ListName::Collapses => rows!(COLLAPSES, default.collapse).into(),
         ListName::Levels => Level::ALL.iter().map(level).collect(),
         ListName::Presets => rows!(Preset::ALL, Preset::default()).into(),
-        ListName::Widths => rows!(Width::ALL, default.width).into(),
+        ListName::Widths => rows!(Width::ALL, default.engine.width()).into(),
     }
 }
 

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use antumbra::recipe::{Builder, Order};
-use antumbra::{BuildMonitor, Isa, Ray, Width};
+use antumbra::recipe::{Builder, Engine, Order};
+use antumbra::{BuildMonitor, Isa, Ray};
 use antumbra_image::{Allowance, Raster, Samples};
 use antumbra_lab::count;
 use antumbra_load::{
@@ -396,7 +396,7 @@ pub fn warn_of_nothing(scene: &Scene, world: &World, isa: Isa) {
     let Ok(camera) = Camera::new(&scene.camera, &scene.film) else {
         return;
     };
-    let bvh = world.bvh(Width::auto(isa.level()), isa);
+    let bvh = world.bvh(Engine::of(isa));
     let [x0, x1, y0, y1] = scene.film.pixel_bounds().map(|edge| edge as i32);
     let sees = (y0..y1).any(|y| {
         let row = (x0..x1).map(|x| camera.ray([x as f32 + 0.5, y as f32 + 0.5], [0.5; 2]));

@@ -3,11 +3,9 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use antumbra::recipe::Level;
 use antumbra::shapes::{Disk, Sphere};
 use antumbra::{
-    Build, BuildMonitor, Bvh, Geometry as Kernel, Hit, Instance, Masks, Object, Recipe, Width,
-    World,
+    Build, BuildMonitor, Bvh, Geometry as Kernel, Hit, Instance, Masks, Object, Recipe, World,
 };
 
 use crate::abi::{Bounds, INVALID, ProgressFunction, RtcRay, SCENE_DYNAMIC, SCENE_ROBUST};
@@ -277,14 +275,9 @@ impl Plan {
             true => Recipe::fast(),
             false => Recipe::default(),
         };
-        let recipe = match self.device.isa() {
+        match self.device.isa() {
             Some(isa) => recipe.isa(isa),
             None => recipe,
-        };
-        // Clients trace ray by ray, and a single ray visits fewer of these nodes. Batches would be faster with 8 children.
-        match recipe.isa.level() {
-            Level::Avx2 => recipe.width(Width::W16),
-            _ => recipe,
         }
     }
 

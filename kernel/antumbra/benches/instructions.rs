@@ -5,10 +5,10 @@ mod cases;
 
 use std::hint::black_box;
 
-use antumbra::recipe::Level;
-use antumbra::{Isa, Width};
+use antumbra::Isa;
+use antumbra::recipe::{Engine, Level};
 
-use cases::{Case, Scene, Work};
+use cases::{Scene, Work};
 
 /// Where one count ends and the next begins: every call of this function, found by its name.
 #[inline(never)]
@@ -29,9 +29,9 @@ const KINDS: [Kind; 5] = [
 fn main() {
     // Valgrind knows no AVX-512, and the counts of a machine with it must be those of one without.
     for isa in Isa::available().filter(|isa| isa.level() != Level::Avx512) {
-        let width = Width::auto(isa.level());
-        let case = Case { isa, width };
-        let scene = Scene::new(case);
+        let engine = Engine::of(isa);
+        let case = format!("{}-{}", isa.level(), engine.width());
+        let scene = Scene::new(engine);
         let mut work = Work::new(&scene);
         for (name, kind) in KINDS {
             counts_begin_anew();

@@ -4,8 +4,11 @@ use alloc::string::String;
 use alloc::vec::Vec;
 use core::fmt;
 
+use antumbra_simd::Level;
+
 use crate::geometry::GeometryId;
 use crate::shape::Shape;
+use crate::tree::width::Width;
 
 /// Why a tree could not be built or an order not be planned.
 ///
@@ -176,12 +179,19 @@ pub enum Error {
     },
     /// A tree with instances was to be refitted: a [`World`](crate::World) refits its objects.
     HasInstances,
-    /// Objects of one world have trees of different widths.
+    /// A tree has another width than the world that it should join, or than the queries that should run in it.
     OtherWidth {
-        /// Children per node of the world.
+        /// Children per node of the world, or of the trees of the queries.
         expected: usize,
-        /// Children per node of the object.
+        /// Children per node of the tree.
         found: usize,
+    },
+    /// There are no queries for trees of this width on this level.
+    NoEngine {
+        /// The level of the recipe.
+        level: Level,
+        /// The width of the recipe.
+        width: Width,
     },
     /// A learned order was requested without the log it learns from.
     NeedsLog(&'static str),
@@ -321,7 +331,12 @@ impl fmt::Display for Error {
             ),
             Self::OtherWidth { expected, found } => write!(
                 f,
-                "an object with {found} children per node does not fit a world of {expected}"
+                "a tree of {found} children per node does not fit one of {expected}"
+            ),
+            Self::NoEngine { level, width } => write!(
+                f,
+                "level `{level}` traces trees of {} children per node, not {width}; level `scalar` traces all",
+                Width::auto(*level)
             ),
             Self::NeedsLog(order) => write!(
                 f,

@@ -180,6 +180,7 @@ pub mod recipe {
     pub use crate::builder::Builder;
     pub use crate::collapse::Collapse;
     pub use crate::order::Order;
+    pub use crate::trace::engine::Engine;
     pub use crate::tree::costs::CostModel;
 }
 

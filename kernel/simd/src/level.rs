@@ -118,6 +118,14 @@ pub trait Simd: Copy + Send + Sync + 'static + Width<4> + Width<8> + Width<16> {
     /// Level that the token stands for.
     const LEVEL: Level;
 
+    /// Floats in a register; 0 where there are no vectors.
+    const LANES: usize;
+
+    /// Runs code on the level of the token.
+    fn run<const N: usize, Op: WithSimd<N>>(self, op: Op) -> Op::Output
+    where
+        Self: Width<N>;
+
     /// Keeps, of the first `count` words, the words whose upper half is at most `limit`, and returns their number.
     ///
     /// Kept words are written to the front of `out` in their order. The rest of `out` is unspecified.

@@ -7,6 +7,7 @@ use antumbra::{
     Batch, Bvh, ClosestPoint, Directions, Hit, Isa, PrimId, Ray, RayColumns, RayOrder, RayQuery,
     Surface, Visit,
 };
+use antumbra_trees::engine;
 use xxhash_rust::xxh3::Xxh3Default;
 
 use crate::scenes::Moving;
@@ -104,7 +105,9 @@ impl<'a> Questions<'a> {
     /// The two questions that matter most, of all rays so many times over: threads share batches that are long enough.
     pub fn briefly(&self, bvh: &Bvh, times: usize) -> Vec<Answer> {
         let mut bvh = bvh.clone();
-        bvh.set_isa(Isa::best());
+        engine(Isa::best(), bvh.width())
+            .run(&mut bvh)
+            .expect("its width");
         let rays = self.rays.repeat(times);
         let (occluded, hits) = (bvh.batch(&rays).occluded(), bvh.batch(&rays).intersect());
         let mut answers = Vec::new();

@@ -24,6 +24,7 @@ mod ask;
 mod scenes;
 mod trees;
 
+use antumbra_trees::engine;
 use std::collections::BTreeMap;
 
 use antumbra::{Bvh, Isa, Width};
@@ -137,7 +138,7 @@ fn still(args: &Args, name: &str, scene: &Scene) -> Vec<String> {
         if args.wants("who", name) || args.wants("where", name) {
             for (kind, mut bvh) in trees::masked(scene, *width, bvh.clone()) {
                 for isa in args.levels(turn) {
-                    bvh.set_isa(isa);
+                    engine(isa, bvh.width()).run(&mut bvh).expect("its width");
                     answers.add(
                         &format!("{kind} w{width} {}", isa.level()),
                         questions.all(&bvh, conditions),
@@ -176,7 +177,7 @@ fn moving(args: &Args, moving: &Moving) -> Vec<String> {
         }
         for (kind, mut bvh) in wholes {
             for isa in args.levels(turn) {
-                bvh.set_isa(isa);
+                engine(isa, bvh.width()).run(&mut bvh).expect("its width");
                 answers.add(
                     &format!("{kind} w{width} {}", isa.level()),
                     ask::at_times(&bvh, moving),
@@ -200,7 +201,7 @@ fn at_levels(
     let row = |(level, isa): (&str, Option<Isa>)| match isa {
         None => Some(format!("{start} {level}{end} not run")),
         Some(isa) if wanted.contains(&isa) => {
-            bvh.set_isa(isa);
+            engine(isa, bvh.width()).run(&mut bvh).expect("its width");
             Some(format!("{start} {level}{end} {}", figure(&bvh)))
         }
         Some(_) => None,

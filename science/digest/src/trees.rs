@@ -3,7 +3,7 @@
 use antumbra::parts::{Cost, Steps};
 use antumbra::recipe::{Builder, Level, Preset};
 use antumbra::{Build, Bvh, Instance, Isa, Masks, Object, Primitives, Ray, Recipe, Width, World};
-use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS};
+use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS, engine};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::scenes::{Moving, Scene};
@@ -31,7 +31,7 @@ pub fn training(rays: &[Ray]) -> Vec<Ray> {
 /// log of rays says so.
 fn learned(recipe: Recipe, width: Width) -> Recipe {
     let scalar = Isa::new(Level::Scalar).expect("every machine has it");
-    recipe.isa(scalar).width(width)
+    recipe.engine(engine(scalar, width))
 }
 
 /// A tree of every preset and width, by recipe and width.

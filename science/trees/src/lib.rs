@@ -1,5 +1,5 @@
 //! Trees for comparison with the ones in the kernel: builders, collapses and child orders from papers and other renderers, which
-//! plug into [`antumbra::parts`], and a bound for every order.
+//! plug into [`antumbra::parts`], a bound for every order, and queries for trees of any width.
 //!
 //! [`ORDERS`], [`BUILDERS`] and [`COLLAPSES`] have the kernel's rows and these, in the order in which studies show them.
 //!
@@ -18,6 +18,7 @@
 
 mod builders;
 mod collapses;
+mod engines;
 mod orders;
 #[cfg(test)]
 mod test_primitives;
@@ -26,6 +27,7 @@ pub use builders::{
     BUILDERS, PBRT, PBRT_2015, PLOC, PLOC_REINSERTION, RDH, SBVH, SRDH, VDBVH, builder,
 };
 pub use collapses::{COLLAPSES, LEARNED_UNSORTED, RSC, collapse};
+pub use engines::{engine, engines};
 pub use orders::oracle::{Visits, oracle_visits, visits};
 pub use orders::{FTOB, ORDERS, RANDOM, RTSAH, order};
 

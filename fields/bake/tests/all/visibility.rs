@@ -1,5 +1,6 @@
 //! What points see: against brute force and closed forms, and with equal bits in parts.
 
+use antumbra::recipe::Engine;
 use antumbra::{Aabb, Bvh, Geometry, Ray, Recipe, Width};
 use antumbra_bake::{
     BitMatrix, Error, Orientation, SkyDivision, UpAxis, Weighting, sees_directions,
@@ -12,7 +13,7 @@ const ANY: f32 = f32::INFINITY;
 
 fn tree(mesh: &Mesh, width: Width) -> Bvh {
     let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
-    Bvh::build(&geometry, &Recipe::default().width(width)).expect("a tree")
+    Bvh::build(&geometry, &Recipe::default().engine(Engine::best(width))).expect("a tree")
 }
 
 /// Some points in the box around a mesh and outside of it.

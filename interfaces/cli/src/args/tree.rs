@@ -153,11 +153,10 @@ impl TreeArgs {
                 .unwrap_or(antumbra::Width::auto(isa.level())),
         };
         preset
-            .isa(isa)
+            .engine(antumbra_trees::engine(isa, width))
             .order(self.order.or(scenes).unwrap_or(preset.order))
             .builder(self.builder.builder.unwrap_or(preset.builder))
             .collapse(self.collapse.unwrap_or(preset.collapse))
-            .width(width)
             .prefetch(self.prefetch.prefetch.0)
     }
 }

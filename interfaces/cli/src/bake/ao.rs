@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::slice;
 
-use antumbra::{Bvh, Isa, Recipe, Width};
+use antumbra::{Bvh, Isa, Recipe};
 use antumbra_bake::{
     AmbientOcclusion, Array, Atlas, Entry, Job as _, Learned, OcclusionJob, Openness, ShadedMesh,
     Weighting, inside_edges, learn_when_it_pays, write_glb,
@@ -230,7 +230,7 @@ fn job(args: &AoArgs, ground: &Ground, target: &Target) -> Result<OcclusionJob, 
 
 /// Makes trees of the scene that learn from rays; none if a tree cannot be made.
 fn learn(ground: &Ground, isa: Isa) -> impl Fn(&[antumbra::Ray]) -> Option<Bvh> {
-    let recipe = Recipe::default().width(Width::auto(isa.level())).isa(isa);
+    let recipe = Recipe::default().isa(isa);
     move |rays| Bvh::learn(ground.world.primitives(), rays, &recipe).ok()
 }
 

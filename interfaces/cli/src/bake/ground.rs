@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use antumbra::recipe::Builder;
-use antumbra::{Bvh, Isa, LocalOrigin, Width};
+use antumbra::recipe::{Builder, Engine};
+use antumbra::{Bvh, Isa, LocalOrigin};
 use antumbra_bake::{CREASE_ANGLE, Curvature, Error, Key, Mesh, Orientation, Sensors, UpAxis};
 use antumbra_lab::count;
 use antumbra_load::{Extent, Loaded, MemorySize, Up};
@@ -59,7 +59,7 @@ impl Ground {
         interrupt::check()?;
         let start = Instant::now();
         let world = scenes::world(&loaded.scene, Builder::default())?;
-        let bvh = world.bvh(Width::auto(isa.level()), isa);
+        let bvh = world.bvh(Engine::of(isa));
         Ok(Self {
             loaded,
             world,

@@ -94,7 +94,7 @@ impl<'a> Document<'a> {
         let text = |path: &Path| path.to_string_lossy().into_owned();
         Self {
             schema: "antumbra.render/1",
-            machine: version::machine(options.recipe.isa),
+            machine: version::machine(options.recipe.engine.isa()),
             seed: options.seed,
             scene: &scene.name,
             output: text(file),
@@ -109,7 +109,7 @@ impl<'a> Document<'a> {
             order: options.recipe.order.name(),
             builder: options.recipe.builder.name(),
             collapse: options.recipe.collapse.name(),
-            width: options.recipe.width.lanes(),
+            width: options.recipe.engine.width().lanes(),
             prefetch: stats.prefetch,
             triangles: stats.triangles,
             primitives: stats.build.primitives,

@@ -1,6 +1,6 @@
 //! `study`, row by row.
 
-use antumbra::recipe::{Level, Order};
+use antumbra::recipe::Level;
 use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS};
 
 use crate::support::{Place, fields, files};

@@ -42,7 +42,7 @@ fn points_have_the_hours_of_the_bake_and_shadows_follow_the_time() {
     let host = format!("127.0.0.1:{port}");
     let scene = scene([64, 48]);
     let world = World::new(&scene).expect("a valid scene");
-    let bvh = world.bvh(antumbra::Width::W8, antumbra::Isa::best());
+    let bvh = world.bvh(antumbra::recipe::Engine::default());
     let done = AtomicBool::new(false);
     let look = || {
         let get = |name: &str| ask(port, "GET", &format!("{path}{name}"), &host, "");

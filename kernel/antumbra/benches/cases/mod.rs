@@ -1,9 +1,7 @@
 //! What is counted: whole queries, on a small scene that is fixed for ever, so that what is measured today can be compared with what was measured before.
 
-use std::fmt;
-
-use antumbra::recipe::{Collapse, Order};
-use antumbra::{Bvh, Geometry, Hit, Isa, Ray, Recipe, Width};
+use antumbra::recipe::{Collapse, Engine, Order};
+use antumbra::{Bvh, Geometry, Hit, Ray, Recipe};
 use antumbra_testkit::{mesh, rng::Rng};
 
 /// The tree fits into a first-level cache: steps are measured, not memory.
@@ -11,19 +9,6 @@ const TRIANGLES: usize = 128;
 
 /// Too many for a CPU to learn by heart which way each of them goes.
 const RAYS: usize = 1024;
-
-/// A width on an instruction set.
-#[derive(Clone, Copy)]
-pub struct Case {
-    pub isa: Isa,
-    pub width: Width,
-}
-
-impl fmt::Display for Case {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}-{}", self.isa.level(), self.width)
-    }
-}
 
 /// A tree and rays.
 pub struct Scene {
@@ -36,14 +21,13 @@ pub struct Scene {
 
 impl Scene {
     /// The tree is collapsed by area, so that the figures do not move with what is learned.
-    pub fn new(case: Case) -> Self {
+    pub fn new(engine: Engine) -> Self {
         let mut rng = Rng::new(1);
         let soup = mesh::soup(&mut rng, TRIANGLES);
         let geometry = [Geometry::triangles(&soup.positions[..], soup.indices)];
         let options = Recipe::default()
-            .isa(case.isa)
+            .engine(engine)
             .collapse(Collapse::Area)
-            .width(case.width)
             .order(Order::Simple);
         let bvh = Bvh::build(&geometry, &options).expect("a proper mesh");
         let mut rays = Vec::new();

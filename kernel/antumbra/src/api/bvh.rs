@@ -10,9 +10,11 @@ use antumbra_simd::Isa;
 
 use super::times::BuildTimes;
 use crate::aabb::Aabb;
+use crate::error::Error;
 use crate::geometry::masks::SceneMasks;
 use crate::geometry::primitives::Primitives;
 use crate::shape::Shape;
+use crate::trace::engine::Engine;
 use crate::trace::memory::Pool;
 use crate::tree::wide::Tree;
 use crate::tree::width::Width;
@@ -45,7 +47,8 @@ use crate::tree::width::Width;
 #[derive(Clone)]
 pub struct Bvh {
     pub(crate) tree: Tree,
-    pub(crate) isa: Isa,
+    /// What answers queries: of the width of the tree.
+    pub(crate) engine: Engine,
     /// Stored ones, see [`Primitives::stored`].
     pub(crate) primitives: usize,
     pub(crate) cutouts: usize,
@@ -65,14 +68,16 @@ pub struct Bvh {
     pub(crate) masks: Option<Arc<SceneMasks>>,
     /// The trees of later spans of a scene that moves.
     pub(crate) later: Vec<Bvh>,
+    /// The width in the file that the tree was read from, if it is another.
+    pub(crate) file_width: Option<Width>,
 }
 
 impl Bvh {
     /// A tree over these primitives, fresh from its collapse.
-    pub(crate) fn fresh(tree: Tree, isa: Isa, primitives: &Primitives) -> Self {
+    pub(crate) fn fresh(tree: Tree, engine: Engine, primitives: &Primitives) -> Self {
         Self {
             tree,
-            isa,
+            engine,
             primitives: primitives.stored(),
             cutouts: primitives.cutouts(),
             dropped: primitives.dropped(),
@@ -86,6 +91,7 @@ impl Bvh {
             built_sah: None,
             masks: None,
             later: Vec::new(),
+            file_width: None,
         }
     }
 
@@ -98,13 +104,7 @@ impl Bvh {
     /// The instruction set that queries run on.
     #[must_use]
     pub fn isa(&self) -> Isa {
-        self.isa
-    }
-
-    /// Runs queries on another instruction set from now on.
-    pub fn set_isa(&mut self, isa: Isa) {
-        self.isa = isa;
-        self.later.iter_mut().for_each(|bvh| bvh.set_isa(isa));
+        self.engine.isa()
     }
 
     /// The smallest box around everything; empty for an empty scene. Where something moves, around everything at all times;
@@ -139,6 +139,21 @@ impl Bvh {
     }
 }
 
+impl Engine {
+    /// Has a tree answer by this engine from now on.
+    ///
+    /// # Errors
+    /// [`Error::OtherWidth`] if the tree has another width.
+    pub fn run(self, bvh: &mut Bvh) -> Result<(), Error> {
+        let [expected, found] = [self.width(), bvh.width()].map(Width::lanes);
+        if expected != found {
+            return Err(Error::OtherWidth { expected, found });
+        }
+        bvh.engine = self;
+        bvh.later.iter_mut().try_for_each(|bvh| self.run(bvh))
+    }
+}
+
 impl fmt::Debug for Bvh {
     /// Counts, not contents.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -148,7 +163,7 @@ impl fmt::Debug for Bvh {
             .field("instances", &report.instances)
             .field("nodes", &report.nodes)
             .field("width", &self.width())
-            .field("isa", &self.isa.level())
+            .field("isa", &self.isa().level())
             .finish_non_exhaustive()
     }
 }

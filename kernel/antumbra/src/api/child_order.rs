@@ -197,6 +197,7 @@ mod tests {
 
     use super::*;
     use crate::parts::{Cost, Steps};
+    use crate::recipe::Engine;
     use crate::{Geometry, Width};
 
     /// A tree that learned from some rays and learns again from others gives the same answers, with fewer tests.
@@ -217,7 +218,7 @@ mod tests {
         let (yesterday, today, test) = (rays(-1.0, -0.5), rays(0.5, 1.0), rays(0.5, 1.0));
         // Of one width everywhere: an order has least to gain in a tree of four children.
         let recipe = Recipe {
-            width: Width::W16,
+            engine: Engine::best(Width::W16),
             ..Recipe::default()
         };
         let mut bvh = Bvh::learn(&geometry, &yesterday, &recipe).expect("a tree");

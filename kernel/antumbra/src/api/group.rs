@@ -3,18 +3,17 @@
 use alloc::vec::Vec;
 use core::fmt;
 
-use antumbra_simd::{Dispatch, Level};
+use antumbra_simd::Level;
 
 use super::batch::CHUNK;
 use super::bvh::Bvh;
 use crate::parallel::for_each;
 use crate::trace::memory::{Memory, Stored};
-use crate::trace::packet::group::{Experience, Found, GroupQuery, Rows};
+use crate::trace::packet::group::{Experience, Found, Part, Rows};
 use crate::trace::packet::sheaf::{Sheaf, sheaves};
 use crate::trace::query::Occlusion;
 use crate::trace::ray_batch::RayBatch;
 use crate::trace::stack::stack_size;
-use crate::tree::any::on_tree;
 
 /// Rays that one thread takes at a time, about.
 const RAYS: usize = 1 << 20;
@@ -227,12 +226,19 @@ impl Bvh {
                 let stack =
                     Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
                 let (experience, pending) = (&mut experience, &mut pending);
-                let open = &mut *open;
-                on_tree!(&self.tree, bvh => {
-                    let found = Found { open, words, pending };
-                    let query = GroupQuery { bvh, stack, rows, first, sheaves, found, experience };
-                    next = self.isa().dispatch_vectors(query).unwrap_or(rows.points.len());
-                });
+                let found = Found {
+                    open,
+                    words,
+                    pending,
+                };
+                let part = Part {
+                    rows,
+                    first,
+                    sheaves,
+                    found,
+                    experience,
+                };
+                next = (self.engine.0).group(&self.tree, stack, part);
             } else {
                 if rows.is_valid(next) {
                     let columns = directions.sheaves.iter().flat_map(Sheaf::columns);

@@ -2,7 +2,6 @@
 
 use alloc::vec::Vec;
 
-use antumbra_simd::Dispatch;
 use antumbra_simd::scratch::Bits;
 
 use super::bvh::Bvh;
@@ -12,12 +11,11 @@ use crate::geometry::primitives::Primitives;
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
-use crate::trace::conditional::Conditional;
+use crate::trace::engine::{Table, Traces};
 use crate::trace::memory::Stored;
-use crate::trace::query::{Closest, Occlusion, Query};
-use crate::trace::view::on_view;
-use crate::trace::visit::{Ahead, Visit, Visiting};
-use crate::tree::any::on_tree;
+use crate::trace::packet::PacketQuery;
+use crate::trace::query::{Closest, Occlusion};
+use crate::trace::visit::{Ahead, Visit};
 
 /// Scenes that move while rays are traced: see [`Geometry::moving`](crate::Geometry::moving) and
 /// [`Instance::moving`](crate::Instance::moving).
@@ -106,8 +104,12 @@ pub(super) struct Moment<'a> {
 }
 
 impl Moment<'_> {
-    fn one<Q: Query<Item: Stored + Bits>>(self, ray: &Ray) -> Q::Answer {
-        on_view!(self.share, view => self.bvh.one::<Q>(ray, view))
+    fn one<Q: PacketQuery<Item: Stored + Bits>>(self, ray: &Ray) -> Q::Answer
+    where
+        dyn Table: Traces<Q>,
+    {
+        self.bvh
+            .one::<Q>(ray, self.share.as_ref().map(core::slice::from_ref))
     }
 
     /// Whether anything occludes a ray.
@@ -134,9 +136,8 @@ impl Moment<'_> {
     /// The first occluder found that satisfies a condition.
     pub fn occluder_when(self, ray: &Ray, condition: &Condition<'_>) -> Option<PrimId> {
         self.bvh.with_stack(|stack: &mut [u32]| {
-            on_tree!(&self.bvh.tree, bvh => on_view!(self.share, view => {
-                self.bvh.isa().dispatch(Conditional { bvh, view, stack, ray, condition })
-            }))
+            let table = self.bvh.engine.0;
+            table.occluder_when(&self.bvh.tree, self.share, stack, ray, condition)
         })
     }
 
@@ -175,8 +176,7 @@ impl Moment<'_> {
             true => visit(hit),
             false => Visit::Reject,
         };
-        on_tree!(&self.bvh.tree, bvh => on_view!(self.share, view => {
-            self.bvh.isa().dispatch(Visiting { bvh, view, ahead, ray, condition, visit })
-        }))
+        let table = self.bvh.engine.0;
+        table.visit(&self.bvh.tree, self.share, ahead, (ray, condition), visit)
     }
 }

@@ -2,8 +2,6 @@
 
 use alloc::vec::Vec;
 
-use antumbra_simd::Dispatch;
-
 use super::batch::filled;
 use super::bvh::Bvh;
 use crate::geometry::instance::dot;
@@ -16,7 +14,7 @@ use crate::trace::brute::Brute;
 use crate::trace::brute_points;
 use crate::trace::inside::{self, Around};
 use crate::trace::memory::Memory;
-use crate::trace::nearest::{Candidate, Nearest, Search, Seeker, Within};
+use crate::trace::nearest::{Candidate, Nearest, Seeker, Within};
 use crate::tree::any::on_tree;
 
 /// Points that one thread takes at a time.
@@ -220,7 +218,7 @@ impl Bvh {
     }
 
     fn seek(&self, memory: &mut Memory, point: [f32; 3], seeker: &mut dyn Seeker) {
-        on_tree!(&self.tree, tree => self.isa.dispatch(Search { tree, point, memory, seeker }));
+        (self.engine.0).search(&self.tree, point, memory, seeker);
     }
 }
 

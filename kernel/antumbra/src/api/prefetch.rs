@@ -5,7 +5,6 @@
 //! beyond noise (`docs/notes/attempts.md`), so the size of the first cache decides.
 
 use super::bvh::Bvh;
-use crate::tree::any::on_tree;
 
 /// Bytes of the smallest first data cache of CPUs with vectors: those with a larger one gain little from a few more.
 const FIRST_CACHE: usize = 32 << 10;
@@ -13,7 +12,7 @@ const FIRST_CACHE: usize = 32 << 10;
 impl Bvh {
     /// Whether batches prefetch: as the recipe says, or else where the tree is larger than the first cache.
     pub(crate) fn prefetches(&self) -> bool {
-        let is_large = || on_tree!(&self.tree, tree => tree.bytes()) > FIRST_CACHE;
+        let is_large = || self.tree.bytes() > FIRST_CACHE;
         self.prefetch.unwrap_or_else(is_large)
     }
 }

@@ -3,7 +3,7 @@
 use alloc::vec;
 use alloc::vec::Vec;
 
-use antumbra_simd::{Dispatch, Level};
+use antumbra_simd::Level;
 
 use super::batch::CHUNK;
 use super::bvh::Bvh;
@@ -12,17 +12,16 @@ use crate::geometry::ray_setup::RaySetup;
 use crate::learn::ray_log::{Following, RayLog};
 use crate::ray::{Hit, Ray};
 use crate::trace::closest_with_leaf::closest_with_leaf;
-use crate::trace::instrumented::Instrumented;
+use crate::trace::engine::{Streams, Table, Traces};
 use crate::trace::memory::{Memory, Stored};
 use crate::trace::observe::{Cost, Counting, Nothing, Observer};
-use crate::trace::packet::{PacketQuery, Packets};
+use crate::trace::packet::PacketQuery;
 use crate::trace::pick::Pick;
-use crate::trace::query::{Closest, Occlusion, Query, StreamQuery};
+use crate::trace::query::{Closest, Occlusion, StreamQuery};
 use crate::trace::ray_batch::RayBatch;
-use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
-use crate::trace::stream::{self, Stream};
-use crate::trace::view::{Shares, Still, Views, on_view};
+use crate::trace::stream;
+use crate::trace::view::on_view;
 use crate::tree::any::on_tree;
 
 /// Fewer rays than this are not worth a stream.
@@ -150,10 +149,8 @@ impl Bvh {
         answers: &mut [bool],
     ) {
         assert_eq!(rays.len(), answers.len(), "one answer per ray");
-        let stack = &mut memory.open;
-        on_tree!(&self.tree, bvh => {
-            self.isa().dispatch(Instrumented { bvh, stack, pick, observer, rays, answers });
-        });
+        let (stack, observer) = (&mut memory.open, (pick, observer));
+        (self.engine.0).observe(&self.tree, stack, observer, rays, answers);
     }
 
     /// A query of many rays: first in packets, then in streams what these leave over.
@@ -162,7 +159,9 @@ impl Bvh {
         memory: &mut Memory,
         batch: &RayBatch<'_>,
         answers: &mut [Q::Answer],
-    ) {
+    ) where
+        dyn Table: Traces<Q>,
+    {
         let mut pending = core::mem::take(&mut memory.pending);
         // The list of pending rays stays in the cache.
         for (index, answers) in answers.chunks_mut(CHUNK).enumerate() {
@@ -184,94 +183,75 @@ impl Bvh {
         batch: &RayBatch<'_>,
         answers: &mut [Q::Answer],
         pending: &mut Vec<u32>,
-    ) {
+    ) where
+        dyn Table: Traces<Q>,
+    {
         if batch.shares().is_some() {
             return pending.extend(0..batch.rays.len() as u32);
         }
         let stack = Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
-        on_tree!(&self.tree, bvh => {
-            self.isa().dispatch_vectors(Packets::<Q, _> { bvh, stack, batch, answers, pending });
-        });
+        (self.engine.0).packets(&self.tree, stack, batch, answers, pending);
     }
 
     /// Answers the pending rays in a stream.
-    pub(super) fn stream<Q: StreamQuery<Item: Stored>>(
+    pub(super) fn stream<Q: PacketQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
         batch: &RayBatch<'_>,
         pending: &[u32],
         answers: &mut [Q::Answer],
-    ) {
+    ) where
+        dyn Table: Traces<Q>,
+    {
         if batch.decides() || batch.reports_surfaces() {
-            self.stream_of::<Q, true>(memory, batch, pending, answers);
-        } else {
-            self.stream_of::<Q, false>(memory, batch, pending, answers);
+            return self.careful_stream::<Q>(memory, batch, pending, answers);
         }
+        self.with_stream(memory, |memory, prefetch| {
+            (self.engine.0).plain_stream(&self.tree, memory, batch, pending, answers, prefetch);
+        });
     }
 
-    /// A stream that decides about every hit and notes leaves (`CAREFUL`), or does neither.
-    pub(super) fn stream_of<Q: StreamQuery<Item: Stored>, const CAREFUL: bool>(
+    /// Answers the pending rays in a stream that decides about every hit and notes leaves.
+    pub(super) fn careful_stream<Q: StreamQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
         batch: &RayBatch<'_>,
         pending: &[u32],
         answers: &mut [Q::Answer],
-    ) {
-        match batch.shares() {
-            None => self.stream_seen::<Q, _, CAREFUL>(memory, Still, batch, pending, answers),
-            Some(shares) => {
-                let views = Shares(shares);
-                self.stream_seen::<Q, _, CAREFUL>(memory, views, batch, pending, answers);
-            }
-        }
+    ) where
+        dyn Table: Streams<Q>,
+    {
+        self.with_stream(memory, |memory, prefetch| {
+            (self.engine.0).careful_stream(&self.tree, memory, batch, pending, answers, prefetch);
+        });
     }
 
-    fn stream_seen<Q: StreamQuery<Item: Stored>, V: Views, const CAREFUL: bool>(
+    /// Runs `work` with memory of a stream, and whether it prefetches.
+    fn with_stream<T: Stored>(
         &self,
         memory: &mut Memory,
-        views: V,
-        batch: &RayBatch<'_>,
-        pending: &[u32],
-        answers: &mut [Q::Answer],
+        work: impl FnOnce((&mut [T], &mut [RaySetup]), bool),
     ) {
         let mut setups = core::mem::take(&mut memory.setups);
         setups.resize(stream::SETUPS, RaySetup::IDLE);
-        let items = Stored::at_least(memory, stream::items(self.width().lanes(), self.depth()));
-        on_tree!(&self.tree, bvh => {
-            self.isa().dispatch_vectors(Stream::<Q, V, _, CAREFUL> {
-                bvh,
-                views,
-                items,
-                setups: &mut setups,
-                batch,
-                pending,
-                answers,
-                prefetch: self.prefetches(),
-            });
-        });
+        let items = T::at_least(memory, stream::items(self.width().lanes(), self.depth()));
+        work((items, &mut setups), self.prefetches());
         memory.setups = setups;
     }
 
     /// A plain query, ray by ray.
-    pub(crate) fn each<Q: Query<Item: Stored>>(
+    pub(crate) fn each<Q: PacketQuery<Item: Stored>>(
         &self,
         memory: &mut Memory,
         batch: &RayBatch<'_>,
         answers: &mut [Q::Answer],
-    ) {
+    ) where
+        dyn Table: Traces<Q>,
+    {
         let rays = batch.rays;
         assert_eq!(rays.len(), answers.len(), "one answer per ray");
         let stack = Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
-        on_tree!(&self.tree, bvh => match batch.shares() {
-            None => {
-                let views = Still;
-                self.isa().dispatch(Single::<Q, _, _> { bvh, views, stack, rays, answers });
-            }
-            Some(shares) => {
-                let views = Shares(shares);
-                self.isa().dispatch(Single::<Q, _, _> { bvh, views, stack, rays, answers });
-            }
-        });
+        (self.engine.0).each(&self.tree, batch.shares(), stack, rays, answers);
     }
 
     /// This tree as a ray of a batch looks at it.

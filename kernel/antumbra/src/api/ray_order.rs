@@ -149,7 +149,7 @@ mod tests {
                     ]
                 })
                 .collect();
-            let recipe = Recipe::fast().width(crate::Width::W4);
+            let recipe = Recipe::fast().engine(crate::recipe::Engine::best(crate::Width::W4));
             Bvh::build(&[Geometry::triangles(positions, indices)], &recipe).expect("in range")
         };
         let (large, small) = (build(500), build(50));

@@ -11,7 +11,6 @@ use crate::ray::{Hit, Ray};
 use crate::trace::brute::Brute;
 use crate::trace::condition::Condition;
 use crate::trace::visit::Visit;
-use crate::tree::any::on_tree;
 
 /// A ray and conditions on what it may hit. Made by [`Bvh::query`]; nothing happens before the last call, which names the
 /// query.
@@ -79,10 +78,10 @@ impl Bvh {
 
     /// Number and object of every instance.
     fn placed_objects(&self) -> Vec<(u32, u32)> {
-        on_tree!(&self.tree, tree => {
-            let placed = tree.instances.iter();
-            placed.map(|placed| (placed.placement.inst_id, placed.object)).collect()
-        })
+        let placed = self.tree.instances.iter();
+        placed
+            .map(|placed| (placed.placement.inst_id, placed.object))
+            .collect()
     }
 }
 

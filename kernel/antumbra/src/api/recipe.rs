@@ -6,8 +6,8 @@ use super::times::Clock;
 use crate::builder::Builder;
 use crate::collapse::Collapse;
 use crate::order::Order;
+use crate::trace::engine::Engine;
 use crate::tree::costs::CostModel;
-use crate::tree::width::Width;
 use antumbra_simd::named_list;
 
 /// Every choice that makes a tree, from builder to child order.
@@ -32,10 +32,8 @@ pub struct Recipe {
     pub collapse: Collapse,
     /// In which order occlusion rays visit children. Default: [`Order::Joint`].
     pub order: Order,
-    /// Children per node. Default: the number that suits the instruction set.
-    pub width: Width,
-    /// Instruction set that queries run on. Default: the best of this CPU.
-    pub isa: Isa,
+    /// What answers queries: an instruction set, and the number of children per node. Default: the best of this CPU.
+    pub engine: Engine,
     /// Costs of the steps of a traversal, in units of the caller's choice. Default: [`CostModel::default`].
     pub costs: CostModel,
     /// Which rays are learned from, how many surface rays are made, and the seed of learning.
@@ -135,13 +133,11 @@ impl Default for Training {
 impl Default for Recipe {
     /// The recommended tree for the best instruction set of this CPU.
     fn default() -> Self {
-        let isa = Isa::best();
         Self {
             builder: Builder::default(),
             collapse: Collapse::default(),
             order: Order::default(),
-            width: Width::auto(isa.level()),
-            isa,
+            engine: Engine::default(),
             costs: CostModel::default(),
             training: Training::default(),
             prefetch: None,
@@ -184,18 +180,14 @@ impl Recipe {
         Self { order, ..self }
     }
 
-    /// Sets the number of children per node. Default: the number that suits the instruction set.
-    pub fn width(self, width: Width) -> Self {
-        Self { width, ..self }
+    /// Sets what answers queries. Default: the best of this CPU.
+    pub fn engine(self, engine: Engine) -> Self {
+        Self { engine, ..self }
     }
 
-    /// Sets the instruction set, and the width that suits it: call [`Recipe::width`] afterwards for another width.
+    /// Sets the instruction set, with the width that suits it.
     pub fn isa(self, isa: Isa) -> Self {
-        Self {
-            isa,
-            width: Width::auto(isa.level()),
-            ..self
-        }
+        self.engine(Engine::of(isa))
     }
 
     /// Sets the costs of the steps of a traversal. Default: [`CostModel::default`].

@@ -3,6 +3,7 @@
 use super::bvh::Bvh;
 use super::times::BuildTimes;
 use crate::tree::costs::CostModel;
+use crate::tree::width::Width;
 
 /// Size, cost and build times of a tree, returned by [`Bvh::report`].
 ///
@@ -59,6 +60,8 @@ pub struct BuildReport {
     pub moves: bool,
     /// Whether batches prefetch nodes and leaves: see [`Recipe::prefetch`](crate::Recipe::prefetch).
     pub prefetches: bool,
+    /// The width that the tree has in the file it was read from, if that is not [`Bvh::width`]: the tree was collapsed anew.
+    pub file_width: Option<Width>,
     /// Times of the steps; `None` without a [clock](crate::Recipe::clock).
     pub times: Option<BuildTimes>,
 }
@@ -88,6 +91,7 @@ impl Bvh {
             training_rays: self.training_rays,
             moves: self.moves(),
             prefetches: self.prefetches(),
+            file_width: self.file_width,
             times: self.times,
         }
     }

@@ -1,18 +1,20 @@
 //! Trees, objects and worlds in files.
 
 use alloc::format;
+use alloc::vec;
 use alloc::vec::Vec;
 #[cfg(feature = "std")]
 use std::io::{Read, Write};
-
-use antumbra_simd::Isa;
 
 use super::bvh::Bvh;
 use super::object::Object;
 use super::world::World;
 use crate::error::Error;
 use crate::geometry::Functions;
+use crate::trace::engine::Engine;
 use crate::trace::memory::Pool;
+use crate::tree::anew::Anew;
+use crate::tree::costs::CostModel;
 use crate::tree::validate::Walked;
 use crate::tree::wide::Tree;
 use crate::tree::width::Width;
@@ -96,8 +98,8 @@ impl Functions {
 }
 
 impl Bvh {
-    /// Writes the tree: geometry, nodes and child order. [`Bvh::read`] makes a tree of it that gives the same answers at the
-    /// same cost, on any machine and instruction set.
+    /// Writes the tree: geometry, nodes and child order. [`Bvh::read`] makes a tree of it that gives the same answers, on any
+    /// machine and instruction set.
     ///
     /// Not written are masks, the times of the [report](Bvh::report), and the functions of filters and user geometry, which
     /// whoever reads the file gives again: see [`Functions`]. Give any writer, buffered or not: the tree is written in large
@@ -110,8 +112,9 @@ impl Bvh {
         write(self, out)
     }
 
-    /// Reads a tree that [`Bvh::write`] wrote, for the best instruction set of this CPU. Takes no byte behind its end. Give any
-    /// reader, buffered or not.
+    /// Reads a tree that [`Bvh::write`] wrote, for the best instruction set of this CPU. A tree of a width that this does not
+    /// have is collapsed anew, with the leaves in the order that was learned; [`BuildReport::file_width`] says so. Takes no byte
+    /// behind its end. Give any reader, buffered or not.
     ///
     /// Files are not trusted. A wrong checksum is an error, and so is a file with a right one whose tree would let a query
     /// panic or run for ever, or has boxes that do not hold what is below them. Nothing checks that the geometry is the one
@@ -155,6 +158,45 @@ impl Bvh {
         Functions::new().from_bytes(bytes)
     }
 
+    /// The tree in the width that suits this CPU. A tree of another width has leaves and order of the one that was read.
+    fn of_own_width(mut self) -> Self {
+        let Some(engine) = self.other_engine() else {
+            return self;
+        };
+        let mut roots = vec![0];
+        roots.extend(self.tree.roots.iter().map(|root| *root as usize));
+        let anew = self.tree.anew(engine.width(), 0, &roots);
+        let deepest = anew.roots[1..].iter().map(|(_, depth)| *depth);
+        self.tree.depth = anew.roots[0].1 + deepest.max().unwrap_or(0);
+        self.adopt_nodes(anew, engine, 1);
+        self
+    }
+
+    /// The engine of this CPU, if a tree from a file has not the width for it.
+    pub(super) fn other_engine(&self) -> Option<Engine> {
+        let engine = Engine::default();
+        (engine.isa() != self.isa()).then_some(engine)
+    }
+
+    /// Takes nodes of another width, of which the roots of objects come behind so many others.
+    pub(super) fn adopt_nodes(&mut self, anew: Anew, engine: Engine, others: usize) {
+        let before = self.tree.sah(&CostModel::default());
+        self.file_width = Some(self.width());
+        self.tree.nodes = anew.nodes;
+        let roots: Vec<_> = anew.roots[others..].iter().map(|(root, _)| *root).collect();
+        for placed in &mut self.tree.instances {
+            if let Ok(object) = self.tree.roots.binary_search(&placed.root) {
+                placed.root = roots[object];
+            }
+        }
+        self.tree.roots = roots;
+        self.engine = engine;
+        (self.predicted_cost, self.predicted_before) = (None, None);
+        // What a refit compares with grows or shrinks as the cost does.
+        let now = self.tree.sah(&CostModel::default());
+        self.built_sah = self.built_sah.map(|built| built * now / before);
+    }
+
     pub(super) fn read_tree(
         words: &mut Words<'_>,
         functions: &Functions,
@@ -170,7 +212,7 @@ impl Bvh {
         let primitives = primitives.map_err(|broken| words.error(broken))?;
         let bvh = Self {
             tree,
-            isa: Isa::best(),
+            engine: Engine::best(width),
             primitives,
             cutouts: cutouts as usize,
             dropped: dropped as usize,
@@ -184,6 +226,7 @@ impl Bvh {
             built_sah,
             masks: None,
             later: Vec::new(),
+            file_width: None,
         };
         Ok((bvh, walked))
     }
@@ -210,7 +253,7 @@ impl Contents for Bvh {
     }
 
     fn read_words(words: &mut Words<'_>, functions: &Functions) -> Result<Self, Error> {
-        Self::read_tree(words, functions).map(|(bvh, _)| bvh)
+        Self::read_tree(words, functions).map(|(bvh, _)| bvh.of_own_width())
     }
 }
 

@@ -2,19 +2,19 @@
 
 use core::cell::Cell;
 
-use antumbra_simd::Dispatch;
 use antumbra_simd::scratch::{Bits, with_scratch};
 
 use super::bvh::Bvh;
 use crate::ray::{Hit, Ray};
+use crate::trace::engine::{Table, Traces};
 use crate::trace::locate::locate;
 use crate::trace::memory::{Memory, Stored};
-use crate::trace::query::{Closest, Occlusion, Query};
+use crate::trace::packet::PacketQuery;
+use crate::trace::query::{Closest, Occlusion};
 use crate::trace::ray_batch::{LocatedHit, RayBatch, Report};
-use crate::trace::single::Single;
 use crate::trace::stack::stack_size;
 use crate::trace::surface::{Surface, surface, unit};
-use crate::trace::view::{Still, Views, on_view};
+use crate::trace::view::on_view;
 use crate::tree::any::on_tree;
 
 /// Items of a stack on the program stack: enough for 32 levels of 16 children, 71 of 8 and 167 of 4. Items that a tree
@@ -38,7 +38,7 @@ impl Bvh {
     #[must_use]
     pub fn occluded(&self, ray: &Ray) -> bool {
         if self.tree.pick.is_none() {
-            return self.one::<Occlusion>(ray, Still);
+            return self.one::<Occlusion>(ray, None);
         }
         let mut answer = [false];
         let batch = RayBatch::new(core::slice::from_ref(ray), 0);
@@ -62,7 +62,7 @@ impl Bvh {
     /// ```
     #[must_use]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        self.one::<Closest>(ray, Still)
+        self.one::<Closest>(ray, None)
     }
 
     /// Geometric normal at a hit, in the world and of length 1. `ray` is the ray of the query, and `hit` its hit.
@@ -149,17 +149,19 @@ impl Bvh {
         memory.hits = hits;
     }
 
-    pub(super) fn one<Q: Query<Item: Stored + Bits>>(
+    /// Answers a ray, at its share of the span if there is one.
+    pub(super) fn one<Q: PacketQuery<Item: Stored + Bits>>(
         &self,
         ray: &Ray,
-        views: impl Views,
-    ) -> Q::Answer {
+        share: Option<&[f32]>,
+    ) -> Q::Answer
+    where
+        dyn Table: Traces<Q>,
+    {
         let mut answer = [Q::miss()];
         self.with_stack(|stack: &mut [Q::Item]| {
-            let (rays, answers) = (core::slice::from_ref(ray), &mut answer[..]);
-            on_tree!(&self.tree, bvh => {
-                self.isa().dispatch(Single::<Q, _, _> { bvh, views, stack, rays, answers });
-            });
+            let rays = core::slice::from_ref(ray);
+            (self.engine.0).each(&self.tree, share, stack, rays, &mut answer);
         });
         let [answer] = answer;
         answer

@@ -225,13 +225,10 @@ impl BinaryStage {
         recipe: &Recipe,
     ) -> Bvh {
         let Recipe {
-            collapse,
-            width,
-            isa,
-            ..
+            collapse, engine, ..
         } = *recipe;
         let Some(log) = log else {
-            return Bvh::collapse(primitives, &self.tree, collapse, width, isa);
+            return Bvh::collapse(primitives, &self.tree, collapse, engine);
         };
         let learning = Learning {
             collapse,
@@ -239,7 +236,7 @@ impl BinaryStage {
             thorough,
             ..Learning::default()
         };
-        Bvh::collapse_logged(primitives, &self.tree, log, &learning, width, isa)
+        Bvh::collapse_logged(primitives, &self.tree, log, &learning, engine)
     }
 
     /// [`Stage::learn`].

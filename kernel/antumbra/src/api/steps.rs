@@ -6,8 +6,6 @@ use alloc::borrow::Cow;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use antumbra_simd::Isa;
-
 use super::bvh::Bvh;
 use super::recipe::Recipe;
 use super::stage::Stage;
@@ -21,12 +19,12 @@ use crate::learn::surface_rays::surface_rays;
 use crate::learn::{Log, LogKind, TreeLog};
 use crate::order::{self, Order};
 use crate::ray::Ray;
+use crate::trace::engine::Engine;
 use crate::trace::observe::{Cost, Observer};
 use crate::trace::pick::{Pick, Shuffle};
 use crate::tree::binary::BinaryTree;
 use crate::tree::costs::CostModel;
 use crate::tree::slot_order::SlotOrder;
-use crate::tree::width::Width;
 
 /// Steps of learning one by one, and queries that count what they do: methods of [`Bvh`] for those who import them.
 ///
@@ -41,8 +39,7 @@ pub trait Steps: Sized {
         primitives: &Primitives,
         tree: &BinaryTree,
         collapse: Collapse,
-        width: Width,
-        isa: Isa,
+        engine: Engine,
     ) -> Self;
 
     /// Collapses a binary tree for the rays in `log`: by default both the nodes and the order of children and
@@ -55,8 +52,7 @@ pub trait Steps: Sized {
         tree: &BinaryTree,
         log: &TreeLog,
         learning: &Learning,
-        width: Width,
-        isa: Isa,
+        engine: Engine,
     ) -> Self;
 
     /// Empty log for this tree. `seed` starts the shuffling, if the kind shuffles.
@@ -132,13 +128,12 @@ impl Steps for Bvh {
         primitives: &Primitives,
         tree: &BinaryTree,
         collapse: Collapse,
-        width: Width,
-        isa: Isa,
+        engine: Engine,
     ) -> Self {
         tree.assert_is_of(primitives);
         if collapse == Collapse::Area {
-            let tree = collapse::by_area(primitives, tree, width);
-            return Self::fresh(tree, isa, primitives);
+            let tree = collapse::by_area(primitives, tree, engine.width());
+            return Self::fresh(tree, engine, primitives);
         }
         let learning = Learning {
             collapse,
@@ -146,7 +141,7 @@ impl Steps for Bvh {
             ..Default::default()
         };
         let log = TreeLog::new(tree);
-        let mut bvh = Self::collapse_logged(primitives, tree, &log, &learning, width, isa);
+        let mut bvh = Self::collapse_logged(primitives, tree, &log, &learning, engine);
         bvh.predicted_cost = None;
         bvh
     }
@@ -156,15 +151,14 @@ impl Steps for Bvh {
         tree: &BinaryTree,
         log: &TreeLog,
         learning: &Learning,
-        width: Width,
-        isa: Isa,
+        engine: Engine,
     ) -> Self {
         tree.assert_is_of(primitives);
         log.assert_fits(tree);
-        let (tree, cost) = collapse::by_log(primitives, tree, log, learning, width);
+        let (tree, cost) = collapse::by_log(primitives, tree, log, learning, engine.width());
         Self {
             predicted_cost: Some(cost),
-            ..Self::fresh(tree, isa, primitives)
+            ..Self::fresh(tree, engine, primitives)
         }
     }
 

@@ -41,10 +41,19 @@ pub(crate) enum TopChild {
 impl TopItem {
     /// Moves the reference to a node back by `by` nodes.
     pub fn move_back(&mut self, by: usize) {
-        if let TopChild::Subtree(child) = &mut self.child
-            && let ChildKind::Inner(index) = child.kind()
-        {
+        if let Some((index, child)) = self.node() {
             *child = Child::inner(index + by);
+        }
+    }
+
+    /// The node that the item refers to, and the reference.
+    pub fn node(&mut self) -> Option<(usize, &mut Child)> {
+        match &mut self.child {
+            TopChild::Subtree(child) => match child.kind() {
+                ChildKind::Inner(index) => Some((index, child)),
+                _ => None,
+            },
+            TopChild::Instance(_) => None,
         }
     }
 }

@@ -375,6 +375,7 @@ mod tests {
     use crate::parts::Steps;
     use crate::ray::Ray;
     use crate::recipe::Level;
+    use crate::trace::engine::Engine;
     use crate::trace::observe::Cost;
     use crate::tree::width::Width;
     use crate::{Bvh, Isa};
@@ -420,7 +421,8 @@ mod tests {
                     .sum();
                 // Other levels may fuse operations and so enter a few more or fewer boxes.
                 let isa = Isa::new(Level::Scalar).expect("on every CPU");
-                let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, Width::W8, isa);
+                let engine = Engine::new(isa, Width::W8).expect("plain code");
+                let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, engine);
                 let mut costs = vec![Cost::default(); rays.len()];
                 bvh.occluded_batch_counted(&rays, &mut vec![false; rays.len()], &mut costs);
                 let tested: u32 = costs.iter().map(|cost| cost.node_tests).sum();

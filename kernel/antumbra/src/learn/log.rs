@@ -266,6 +266,7 @@ impl Observer for Logging<'_> {
 
 #[cfg(test)]
 mod tests {
+    use crate::Bvh;
     use crate::api::steps::Steps;
     use crate::builder::Builder;
     use crate::geometry::primitives::PrimKind;
@@ -276,10 +277,10 @@ mod tests {
     use crate::tree::binary::BinaryTree;
     use crate::tree::node::ChildKind;
     use crate::tree::width::Width;
-    use crate::{Bvh, Isa};
     use antumbra_testkit::{Rng, mesh};
 
     use super::*;
+    use crate::trace::engine::Engine;
 
     /// Every ray that ends in an instance is counted there and at one primitive of the object; the world's own
     /// primitives and the instances have ended all occluded rays.
@@ -305,8 +306,7 @@ mod tests {
             &primitives,
             &tree,
             crate::recipe::Collapse::Area,
-            Width::W8,
-            Isa::best(),
+            Engine::best(Width::W8),
         );
         let rays: Vec<_> = (0..3000)
             .map(|_| Ray::between(rng.point(2.0), rng.point(2.0)))

@@ -151,10 +151,10 @@ mod tests {
     use crate::geometry::{Geometry, Instance};
     use crate::learn::Log;
     use crate::order::Plan;
+    use crate::trace::engine::Engine;
     use crate::trace::pick::Shuffle;
     use crate::tree::binary::BinaryTree;
     use crate::tree::costs::CostModel;
-    use crate::tree::nodes::Nodes;
     use crate::tree::slot_order::{self, SlotOrder};
     use crate::tree::wide::Tree;
     use crate::tree::width::Width as NodeWidth;
@@ -286,21 +286,13 @@ mod tests {
             &primitives,
             &tree,
             crate::recipe::Collapse::Area,
-            NodeWidth::W8,
-            Isa::best(),
+            Engine::best(NodeWidth::W8),
         );
         let mut expected = vec![false; rays.len()];
         plain.batch(&rays).occluded_into(&mut expected);
         plain.tree.pick = Some(&Farthest);
 
-        let Nodes::W8(nodes) = &plain.tree.nodes else {
-            unreachable!("8 wide")
-        };
-        let bvh = &WideTree {
-            nodes,
-            moves: &[],
-            tree: &plain.tree,
-        };
+        let bvh = &plain.tree.wide::<8>();
         for isa in Isa::available() {
             let mut met = Vec::new();
             for goes_on in [false, true] {

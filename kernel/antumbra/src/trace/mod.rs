@@ -20,6 +20,8 @@
 //! finds the leaf without vectors, `locate` finds it again from the ids of a hit. `memory` keeps stacks between queries.
 //! `brute` uses no tree at all and is the oracle of the tests.
 //!
+//! `engine` is the table of all that is compiled for a width and a level.
+//!
 //! Loops 4 to 6 are compiled for both queries per width and level, and know one order of children: ascending slots for
 //! occlusion, by distance for closest hits. Everything else goes through loop 7, which is compiled once per width and
 //! level. Logs and orders are made elsewhere, by those who observe.
@@ -31,6 +33,7 @@ pub(crate) mod closest_with_leaf;
 pub(crate) mod condition;
 pub(crate) mod conditional;
 mod deferred;
+pub(crate) mod engine;
 pub(crate) mod inside;
 pub(crate) mod instrumented;
 mod leaf_places;

@@ -4,27 +4,19 @@
 macro_rules! on_tree {
     ($any:expr, $tree:ident => $body:expr) => {{
         let any: &$crate::tree::wide::Tree = $any;
-        macro_rules! seen {
-            ($Width:ident, $nodes:ident) => {{
-                let moves = match any.motion.as_deref() {
-                    Some($crate::tree::motion::Motion {
-                        nodes: $crate::tree::nodes::Nodes::$Width(moves),
-                        ..
-                    }) => &moves[..],
-                    _ => &[],
-                };
-                let $tree = &$crate::tree::wide::WideTree {
-                    nodes: $nodes,
-                    moves,
-                    tree: any,
-                };
+        match any.width() {
+            $crate::tree::width::Width::W4 => {
+                let $tree = &any.wide::<4>();
                 $body
-            }};
-        }
-        match &any.nodes {
-            $crate::tree::nodes::Nodes::W4(nodes) => seen!(W4, nodes),
-            $crate::tree::nodes::Nodes::W8(nodes) => seen!(W8, nodes),
-            $crate::tree::nodes::Nodes::W16(nodes) => seen!(W16, nodes),
+            }
+            $crate::tree::width::Width::W8 => {
+                let $tree = &any.wide::<8>();
+                $body
+            }
+            $crate::tree::width::Width::W16 => {
+                let $tree = &any.wide::<16>();
+                $body
+            }
         }
     }};
 }

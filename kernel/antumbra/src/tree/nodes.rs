@@ -1,6 +1,7 @@
 //! The nodes of a tree, whatever its width: a list for code that is compiled once.
 
 use alloc::vec::Vec;
+use core::any::Any;
 
 use antumbra_simd::memory::vec_in_huge_pages;
 
@@ -49,6 +50,13 @@ impl Nodes {
             Self::W8(_) => Width::W8,
             Self::W16(_) => Width::W16,
         }
+    }
+
+    /// All nodes, if that is their width; otherwise none.
+    #[inline(always)]
+    pub fn of_width<const N: usize>(&self) -> &[Node<N>] {
+        let nodes = on_nodes!(Self, self, nodes => (nodes as &dyn Any).downcast_ref());
+        nodes.map_or(&[], |nodes: &Vec<Node<N>>| nodes)
     }
 
     pub fn len(&self) -> usize {

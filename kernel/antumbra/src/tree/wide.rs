@@ -101,6 +101,16 @@ impl Tree {
         self.nodes.width()
     }
 
+    /// The tree as queries see it that are compiled for its width.
+    #[inline(always)]
+    pub(crate) fn wide<const N: usize>(&self) -> WideTree<'_, N> {
+        WideTree {
+            nodes: self.nodes.of_width(),
+            moves: (self.motion.as_deref()).map_or(&[], |motion| motion.nodes.of_width()),
+            tree: self,
+        }
+    }
+
     /// Instances are numbered behind the leaves, where both are counted.
     #[inline(always)]
     pub(crate) fn instance_index(&self, instance: usize) -> usize {

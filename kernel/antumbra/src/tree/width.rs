@@ -8,10 +8,10 @@ named_list! {
     /// How many children a node has.
     ///
     /// ```
-    /// use antumbra::{Recipe, Width};
+    /// use antumbra::Width;
     ///
     /// assert_eq!(Width::from_lanes(8), Some(Width::W8));
-    /// assert_eq!(Recipe::default().width(Width::W4).width.lanes(), 4);
+    /// assert_eq!(Width::W4.lanes(), 4);
     /// ```
     pub enum Width("width"): () {
         W4 = "4", "Four children per node: the paper's QBVH", None, ();
@@ -33,6 +33,15 @@ impl Width {
     /// The width with so many children per node; `None` unless that is 4, 8 or 16.
     pub fn from_lanes(lanes: usize) -> Option<Self> {
         Self::ALL.into_iter().find(|width| width.lanes() == lanes)
+    }
+
+    /// The width with so many children per node, which is known to be 4, 8 or 16.
+    pub(crate) const fn of_lanes(lanes: usize) -> Self {
+        match lanes {
+            4 => Self::W4,
+            8 => Self::W8,
+            _ => Self::W16,
+        }
     }
 
     /// Default width for a level: as wide as its registers.

@@ -1,18 +1,18 @@
 //! Batches of every length, with rays that can hit nothing among them, give the answers of single queries, on
 //! one thread and on several.
 
-use antumbra::recipe::Order;
-use antumbra::{Bvh, Hit, Isa, Ray, Recipe, Width};
+use antumbra::recipe::{Engine, Order};
+use antumbra::{Bvh, Hit, Ray, Recipe, Width};
 use antumbra_testkit::{Rng, mesh, rays};
 
-use crate::support::{geometry, kernel_rays};
+use crate::support::{engines_for, geometry, kernel_rays};
 
 /// Lengths around the number of rays in flight, and longer than what one thread takes at a time.
 const LENGTHS: [usize; 19] = [
     0, 1, 2, 7, 8, 9, 15, 16, 17, 31, 32, 33, 48, 63, 64, 65, 127, 500, 40_000,
 ];
 
-fn tree(width: Width, isa: Isa) -> (Bvh, Vec<Ray>) {
+fn tree(engine: Engine) -> (Bvh, Vec<Ray>) {
     let mut rng = Rng::new(2016);
     let mesh = mesh::bumpy_grid(&mut rng, 600);
     // Bundles first, then rays that go alone, then both in turns.
@@ -28,7 +28,7 @@ fn tree(width: Width, isa: Isa) -> (Bvh, Vec<Ray>) {
     for index in (5..rays.len()).step_by(11).chain(70..110) {
         rays[index].dir = [0.0, f32::NAN, 0.0];
     }
-    let options = Recipe::default().isa(isa).width(width);
+    let options = Recipe::default().engine(engine);
     let bvh = Bvh::build(&[geometry(&mesh)], &options).expect("a mesh");
     (bvh, rays)
 }
@@ -37,16 +37,16 @@ fn tree(width: Width, isa: Isa) -> (Bvh, Vec<Ray>) {
 fn batches_of_every_length_equal_single_queries() {
     let as_built = Recipe::default().order(Order::Simple);
     for width in Width::ALL {
-        let (mut bvh, rays) = tree(width, Isa::best());
+        let (mut bvh, rays) = tree(Engine::best(width));
         let occluded: Vec<bool> = rays.iter().map(|ray| bvh.occluded(ray)).collect();
         let hits: Vec<Option<Hit>> = rays.iter().map(|ray| bvh.intersect(ray)).collect();
         assert!(occluded.contains(&true) && occluded.contains(&false));
-        for isa in Isa::available() {
-            bvh.set_isa(isa);
+        for engine in engines_for(width) {
+            engine.run(&mut bvh).expect("its width");
             for (turn, length) in LENGTHS.into_iter().enumerate() {
                 let prefetch = as_built.prefetch(Some(turn % 2 == 0));
                 bvh.relearn(&[], &prefetch);
-                let place = format!("x{width} {} {length} rays", isa.level());
+                let place = format!("{engine:?} {length} rays");
                 let rays = &rays[..length];
                 // Answers of another batch must not shine through.
                 let mut found = vec![true; length];
@@ -84,7 +84,7 @@ fn batches_of_every_length_equal_single_queries() {
 #[test]
 #[cfg_attr(target_family = "wasm", ignore = "WebAssembly has no threads")]
 fn the_number_of_threads_changes_no_answer() {
-    let (bvh, rays) = tree(Width::W8, Isa::best());
+    let (bvh, rays) = tree(Engine::best(Width::W8));
     let mut answers = Vec::new();
     for threads in [1, 2, 5] {
         let pool = rayon::ThreadPoolBuilder::new()
@@ -105,7 +105,7 @@ fn the_number_of_threads_changes_no_answer() {
 #[test]
 #[should_panic(expected = "one answer per ray")]
 fn slices_of_different_length_panic() {
-    let (bvh, rays) = tree(Width::W4, Isa::best());
+    let (bvh, rays) = tree(Engine::best(Width::W4));
     bvh.batch(&rays)
         .occluded_into(&mut vec![false; rays.len() - 1]);
 }

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use crate::support::{BUILDERS, equals_brute_by, geometry, ways};
-use antumbra::recipe::{Builder, Clock, Collapse};
+use antumbra::recipe::{Builder, Clock, Collapse, Engine};
 use antumbra::shapes::Sphere;
 use antumbra::{Bvh, Error, Geometry, Primitives, Ray, Recipe, Width};
 use antumbra_testkit::sample::{pairs, triples};
@@ -80,7 +80,9 @@ fn every_primitive_is_in_the_tree() {
         for size in [0, 1, 2, 7, 8, 9, 100, 3000] {
             let mesh = generate(&mut rng, size.max(1));
             for (builder, width) in pairs(rng.bits(), &BUILDERS, &Width::ALL) {
-                let options = Recipe::default().builder(builder).width(width);
+                let options = Recipe::default()
+                    .builder(builder)
+                    .engine(Engine::best(width));
                 let bvh = Bvh::build(&[geometry(&mesh)], &options).expect("indices in range");
                 bvh.validate()
                     .unwrap_or_else(|broken| panic!("{} {size} {builder}: {broken}", mesh.name));
@@ -124,7 +126,9 @@ fn trees_stay_shallow() {
         .collect();
     let geometries = [Geometry::triangles(positions, indices)];
     for builder in BUILDERS {
-        let options = Recipe::default().builder(builder).width(Width::W4);
+        let options = Recipe::default()
+            .builder(builder)
+            .engine(Engine::best(Width::W4));
         let bvh = Bvh::build(&geometries, &options).expect("indices in range");
         bvh.validate().expect("a valid tree");
         assert!(bvh.report().depth <= 94, "{:?}", bvh.report());

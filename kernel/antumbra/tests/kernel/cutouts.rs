@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Coverage, Opacity, Pattern, QueryKind};
 use antumbra::parts::{BinaryTree, Learning, LogKind, Steps, TreeLog};
-use antumbra::recipe::{Builder, Collapse};
+use antumbra::recipe::{Builder, Collapse, Engine};
 use antumbra::shapes::Sphere;
-use antumbra::{Brute, Bvh, Geometry, Instance, Isa, Primitives, Ray, Width};
+use antumbra::{Brute, Bvh, Geometry, Instance, Primitives, Ray, Width};
 use antumbra_testkit::sample::pairs;
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 use proptest::prelude::*;
@@ -185,19 +185,19 @@ fn learned_trees_equal_brute_force() {
     let primitives = Primitives::new(&geometries).expect("indices in range");
     let brute = Brute::new(&primitives);
     let rays = kernel_rays(&rays::around(&mut rng, &opaque, 400));
-    for (builder, (width, isa)) in pairs(seed, &Builder::ALL, &ways()) {
+    for (builder, engine) in pairs(seed, &Builder::ALL, &ways()) {
         let tree = BinaryTree::build(&primitives, builder);
         let mut log = TreeLog::new(&tree);
         log.add(&primitives, &tree, &rays, 1.0);
         let learning = Learning::default();
-        let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
+        let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, engine);
         bvh.validate().expect("a valid tree");
         let mut occluded = vec![false; rays.len()];
         let mut hits = vec![None; rays.len()];
         bvh.batch(&rays).occluded_into(&mut occluded);
         bvh.batch(&rays).intersect_into(&mut hits);
         for (index, ray) in rays.iter().enumerate() {
-            let place = format!("seed {seed} {builder} x{width} {} {ray:?}", isa.level());
+            let place = format!("seed {seed} {builder} {engine:?} {ray:?}");
             assert_eq!(occluded[index], brute.occluded(ray), "{place}");
             assert_eq!(bits(hits[index]), bits(brute.intersect(ray)), "{place}");
         }
@@ -253,7 +253,7 @@ fn instances_stop_rays_independently() {
     let instances = [at(1.0), at(1.0), at(1.0)];
     let primitives = Primitives::with_instances(&[], &objects, &instances).expect("one object");
     let tree = BinaryTree::build(&primitives, Builder::default());
-    let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, Width::W8, Isa::best());
+    let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, Engine::best(Width::W8));
     let mut occluded = vec![false; COUNT];
     bvh.batch(&rays).occluded_into(&mut occluded);
     let found = occluded.iter().filter(|occluded| **occluded).count() as f64;
@@ -601,7 +601,7 @@ fn logs_count_what_occludes() {
     let mut log = TreeLog::new(&tree);
     log.add(&primitives, &tree, &rays, 1.0);
     let learning = Learning::default();
-    let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, Width::W4, Isa::best());
+    let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, Engine::best(Width::W4));
     let (mut occluded, mut costs) = (
         vec![false; rays.len()],
         vec![Default::default(); rays.len()],

@@ -1,9 +1,9 @@
 //! What was dropped is named, and binary trees know what they were built over.
 
 use antumbra::parts::{BinaryTree, Steps, TreeLog};
-use antumbra::recipe::{Builder, Collapse};
+use antumbra::recipe::{Builder, Collapse, Engine};
 use antumbra::shapes::{DropReason, Dropped, Sphere};
-use antumbra::{Bvh, Geometry, Instance, Isa, Primitives, Width};
+use antumbra::{Bvh, Geometry, Instance, Primitives, Width};
 use antumbra_testkit::{Rng, mesh};
 
 use crate::support::{BUILDERS, geometry};
@@ -101,7 +101,7 @@ fn a_binary_tree_knows_its_primitives() {
 fn a_tree_of_other_primitives_is_not_collapsed() {
     let [own, other] = twins();
     let tree = BinaryTree::build(&own, Builder::default());
-    Bvh::collapse(&other, &tree, Collapse::Area, Width::W8, Isa::best());
+    Bvh::collapse(&other, &tree, Collapse::Area, Engine::best(Width::W8));
 }
 
 #[test]

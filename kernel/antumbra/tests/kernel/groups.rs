@@ -1,5 +1,6 @@
 //! Groups: rays of many points in the same directions have the answers of single rays, in every tree and level.
 
+use antumbra::recipe::Engine;
 use antumbra::{Bvh, Directions, Instance, Primitives, Ray, Recipe, Width};
 use antumbra_testkit::sample::pairs;
 use antumbra_testkit::{Rng, mesh};
@@ -115,13 +116,13 @@ fn rays_of_a_group_have_the_answers_of_single_rays() {
     let (mut rng, rounds) = (Rng::new(33), cases(1));
     let mut traced = 0;
     let meshes = (0..rounds).flat_map(|round| pairs(round.into(), mesh::ALL, &ways()));
-    for (generate, (width, isa)) in meshes {
+    for (generate, engine) in meshes {
         let mesh = generate(&mut rng, 300);
         let case = Case::new(&mut rng, &mesh.positions);
         let given = directions(&mut rng);
-        let recipe = Recipe::default().width(width).isa(isa);
+        let recipe = Recipe::default().engine(engine);
         let bvh = Bvh::build(&[geometry(&mesh)], &recipe).expect("a mesh");
-        let place = format!("{} x{width} {}", mesh.name, isa.level());
+        let place = format!("{} {engine:?}", mesh.name);
         traced += case.check(&bvh, &given, &place);
     }
     println!("{traced} rays");
@@ -148,7 +149,8 @@ fn instances_and_other_kinds_have_them_too() {
     let case = Case::new(&mut rng, &mesh.positions);
     let given = directions(&mut rng);
     for width in Width::ALL {
-        let bvh = Bvh::build(&primitives, &Recipe::default().width(width)).expect("a tree");
+        let bvh = Bvh::build(&primitives, &Recipe::default().engine(Engine::best(width)))
+            .expect("a tree");
         case.check(&bvh, &given, &format!("instances x{width}"));
     }
 }

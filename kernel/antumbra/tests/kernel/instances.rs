@@ -5,7 +5,7 @@ use crate::support::{
 };
 use crate::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
 use antumbra::parts::{BinaryTree, Learning, Steps, TreeLog, surface_rays};
-use antumbra::recipe::{Builder, Collapse};
+use antumbra::recipe::{Builder, Collapse, Engine};
 use antumbra::shapes::Sphere;
 use antumbra::{
     Brute, Bvh, Error, Geometry, Hit, INVALID_ID, Instance, Primitives, Ray, Recipe, Width,
@@ -220,15 +220,14 @@ proptest! {
         let rays = scene.rays(&mut rng, 150);
         let expected = Expected::new(&primitives, &rays, &format!("seed {seed}"));
         let trees = triples(seed, &BUILDERS, &collapses(), &ways());
-        for (builder, (collapse, sort), (width, isa)) in trees {
+        for (builder, (collapse, sort), engine) in trees {
             let tree = BinaryTree::build(&primitives, builder);
             let mut log = TreeLog::new(&tree);
             log.add(&primitives, &tree, &rays[..75], 100.0);
             log.add(&primitives, &tree, &surface_rays(&primitives, 100, seed), 100.0);
             let learning = Learning { collapse, sort, ..Default::default() };
-            let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
-            let level = isa.level();
-            let place = format!("seed {seed} {builder} {collapse} sorted {sort} x{width} {level}");
+            let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, engine);
+            let place = format!("seed {seed} {builder} {collapse} sorted {sort} {engine:?}");
             expected.check(&bvh, &rays, &place);
         }
     }
@@ -287,9 +286,9 @@ fn intervals_that_end_at_a_hit_are_exact() {
         let place = format!("seed {seed} round {round}");
         let expected = Expected::new(&primitives, &rays, &place);
         let tree = BinaryTree::build(&primitives, Builder::default());
-        for (width, isa) in ways() {
-            let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, isa);
-            expected.check(&bvh, &rays, &format!("{place} x{width} {}", isa.level()));
+        for engine in ways() {
+            let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, engine);
+            expected.check(&bvh, &rays, &format!("{place} {engine:?}"));
         }
     }
 }
@@ -327,11 +326,10 @@ fn clamped_hits_are_ranked_alike_by_every_tree() {
         let expected = Expected::new(&primitives, &rays, &place);
         let hits = expected.hits.iter().flatten().count();
         assert!(hits > 50, "{place}: {hits} hits");
-        for (builder, (width, isa)) in pairs(round, &BUILDERS, &ways()) {
+        for (builder, engine) in pairs(round, &BUILDERS, &ways()) {
             let tree = BinaryTree::build(&primitives, builder);
-            let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, isa);
-            let level = isa.level();
-            expected.check(&bvh, &rays, &format!("{place} {builder} x{width} {level}"));
+            let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, engine);
+            expected.check(&bvh, &rays, &format!("{place} {builder} {engine:?}"));
         }
     }
 }
@@ -474,7 +472,7 @@ fn closed_objects_do_not_leak() {
             continue;
         }
         for width in Width::ALL {
-            let options = Recipe::default().width(width);
+            let options = Recipe::default().engine(Engine::best(width));
             let bvh = Bvh::build(&primitives, &options).expect("a tree");
             let rays: Vec<_> = (0..5000)
                 .map(|_| {

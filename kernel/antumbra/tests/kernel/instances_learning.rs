@@ -3,8 +3,8 @@
 use crate::support::{BUILDERS, geometry, kernel_rays};
 use crate::transforms::{IDENTITY, product, rotation, scale, translation};
 use antumbra::parts::{BinaryTree, Cost, Learning, Steps, TreeLog, surface_rays};
-use antumbra::recipe::{Builder, Collapse, CostModel, Order};
-use antumbra::{Bvh, Error, Geometry, Instance, Isa, Primitives, Ray, Recipe, Width};
+use antumbra::recipe::{Builder, Collapse, CostModel, Engine, Order};
+use antumbra::{Bvh, Error, Geometry, Instance, Primitives, Ray, Recipe, Width};
 use antumbra_testkit::{Rng, mesh, rays};
 
 /// A ground with many trees of one kind, overlapping each other, and rays among them.
@@ -68,7 +68,7 @@ fn learning_lowers_costs_on_both_levels() {
     let (training, test) = rays.split_at(2000);
     let tree = BinaryTree::build(&primitives, Builder::default());
     for width in Width::ALL {
-        let built = Bvh::collapse(&primitives, &tree, Collapse::Area, width, Isa::best());
+        let built = Bvh::collapse(&primitives, &tree, Collapse::Area, Engine::best(width));
         let (simple, simple_top) = node_tests(&built, test);
         let kind = Order::SortPlus.log_kind().expect("a learned order");
         let mut log = built.new_log(kind, 3);
@@ -99,7 +99,8 @@ fn learning_lowers_costs_on_both_levels() {
         let mut log = TreeLog::new(&tree);
         log.add(&primitives, &tree, training, 1000.0);
         let learning = Learning::default();
-        let learned = Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, Isa::best());
+        let learned =
+            Bvh::collapse_logged(&primitives, &tree, &log, &learning, Engine::best(width));
         let (learned, top) = node_tests(&learned, test);
         println!("learned {learned} {top}");
         assert!(learned < simple, "x{width}: {learned}, not below {simple}");

@@ -1,7 +1,8 @@
 //! Answers that stay the same over machines, versions and languages: a check sum of their bits, which the tests of the
 //! Python package compare too (`interfaces/python/tests/test_known_answers.py` makes the same scene and rays).
 
-use antumbra::{Bvh, Geometry, INVALID_ID, Isa, Ray, Recipe, Width};
+use antumbra::recipe::Engine;
+use antumbra::{Bvh, Geometry, INVALID_ID, Ray, Recipe};
 
 /// Numbers in [0, 1) of 24 bits: the generator modulo 2³² of Numerical Recipes, upper bits.
 struct Numbers(u32);
@@ -55,9 +56,9 @@ fn answers_have_the_known_check_sums() {
         .collect();
     let segments: Vec<Ray> = rays.iter().map(|ray| Ray { tfar: 1.0, ..*ray }).collect();
     let geometry = [Geometry::triangles(positions, indices)];
-    for isa in Isa::available() {
-        for width in [Width::W4, Width::W8, Width::W16] {
-            let recipe = Recipe::default().width(width).isa(isa);
+    for engine in Engine::all() {
+        {
+            let recipe = Recipe::default().engine(engine);
             let bvh = Bvh::build(&geometry, &recipe).expect("in range");
             let mut occluded = vec![false; rays.len()];
             bvh.batch(&segments).closed().occluded_into(&mut occluded);
@@ -79,7 +80,7 @@ fn answers_have_the_known_check_sums() {
                         .flat_map(f32::to_le_bytes)
                 })),
             ];
-            assert_eq!(sums, KNOWN, "{isa:?}, {width:?}: {sums:#x?}");
+            assert_eq!(sums, KNOWN, "{engine:?}: {sums:#x?}");
         }
     }
 }

@@ -3,9 +3,9 @@
 
 use crate::support::{BUILDERS, BY_RAY, collapses, geometry, kernel_rays, ways};
 use antumbra::parts::{BinaryTree, Cost, Learning, Steps, TreeLog, surface_rays};
-use antumbra::recipe::{Builder, Collapse, CostModel, Order};
+use antumbra::recipe::{Builder, Collapse, CostModel, Engine, Order};
 use antumbra::shapes::Sphere;
-use antumbra::{Brute, Bvh, Geometry, Isa, Primitives, Ray, Recipe, Width};
+use antumbra::{Brute, Bvh, Geometry, Primitives, Ray, Recipe, Width};
 use antumbra_testkit::sample::triples;
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 
@@ -51,7 +51,7 @@ fn learned_trees_equal_brute_force() {
         let hits: Vec<_> = rays.iter().map(|ray| brute.intersect(ray)).collect();
         let expected = (occluded, hits);
         let trees = triples(rng.bits(), &BUILDERS, &collapses(), &ways());
-        for (builder, (collapse, sort), (width, isa)) in trees {
+        for (builder, (collapse, sort), engine) in trees {
             let tree = BinaryTree::build(&primitives, builder);
             let log = log(&primitives, &tree, &[&rays[..200]]);
             let learning = Learning {
@@ -59,11 +59,10 @@ fn learned_trees_equal_brute_force() {
                 sort,
                 ..Default::default()
             };
-            let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
+            let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, engine);
             let place = format!(
-                "seed {seed} {} {builder} {collapse} sorted {sort} x{width} {}",
+                "seed {seed} {} {builder} {collapse} sorted {sort} {engine:?}",
                 mesh.name,
-                isa.level()
             );
             bvh.validate()
                 .unwrap_or_else(|broken| panic!("{place}: {broken}"));
@@ -105,8 +104,7 @@ fn paper_orders_apply_to_learned_trees() {
         &tree,
         &tree_log,
         &unsorted,
-        Width::W8,
-        Isa::best(),
+        Engine::best(Width::W8),
     );
     for order in [Order::SortMinus, Order::Sort, Order::SortPlus] {
         let mut bvh = built.clone();
@@ -218,7 +216,7 @@ fn learning_lowers_the_cost_of_the_rays_learned_from() {
         ),
     ];
     for width in Width::ALL {
-        let by_area = Bvh::collapse(primitives, &tree, Collapse::Area, width, Isa::best());
+        let by_area = Bvh::collapse(primitives, &tree, Collapse::Area, Engine::best(width));
         for (kind, [training, test]) in &kinds {
             let log = log(primitives, &tree, &[training]);
             let learn = |collapse| {
@@ -226,7 +224,7 @@ fn learning_lowers_the_cost_of_the_rays_learned_from() {
                     collapse,
                     ..Default::default()
                 };
-                Bvh::collapse_logged(primitives, &tree, &log, &learning, width, Isa::best())
+                Bvh::collapse_logged(primitives, &tree, &log, &learning, Engine::best(width))
             };
             let [sorted, learned] =
                 [Collapse::Area, Collapse::Learned].map(|collapse| cost(&learn(collapse), test));
@@ -279,11 +277,11 @@ fn a_mixed_log_does_no_harm_to_other_rays() {
         let tree = BinaryTree::build(primitives, Builder::default());
         let surface = surface_rays(primitives, 1000, 1);
         for width in Width::ALL {
-            let by_area = Bvh::collapse(primitives, &tree, Collapse::Area, width, Isa::best());
+            let by_area = Bvh::collapse(primitives, &tree, Collapse::Area, Engine::best(width));
             for (learned_from, other) in [(kinds[0], kinds[1]), (kinds[1], kinds[0])] {
                 let learn = |log: TreeLog| {
                     let learning = Learning::default();
-                    Bvh::collapse_logged(primitives, &tree, &log, &learning, width, Isa::best())
+                    Bvh::collapse_logged(primitives, &tree, &log, &learning, Engine::best(width))
                 };
                 let mixed = learn(log(primitives, &tree, &[learned_from, &surface]));
                 let pure = learn(log(primitives, &tree, &[learned_from]));
@@ -307,7 +305,7 @@ fn the_default_build_is_cheaper_than_the_collapse_by_area() {
     let rays = scene.ambient_rays(&mut rng, 4000);
     for width in Width::ALL {
         let build = |recipe: Recipe| {
-            Bvh::build(&geometries, &recipe.width(width)).expect("indices in range")
+            Bvh::build(&geometries, &recipe.engine(Engine::best(width))).expect("indices in range")
         };
         let unlearned = Recipe::default()
             .collapse(Collapse::Area)
@@ -347,8 +345,8 @@ fn logs_do_not_depend_on_the_number_of_threads() {
             let surface = surface_rays(primitives, 777, 3);
             let log = log(primitives, &tree, &[&rays, &surface]);
             let learning = Learning::default();
-            let isa = Isa::best();
-            let bvh = Bvh::collapse_logged(primitives, &tree, &log, &learning, Width::W16, isa);
+            let engine = Engine::best(Width::W16);
+            let bvh = Bvh::collapse_logged(primitives, &tree, &log, &learning, engine);
             (surface, log, format!("{bvh:?}"))
         })
     });
@@ -399,7 +397,7 @@ fn little_to_learn_from_is_no_trouble() {
                 if rays == &improper[..] || rays.is_empty() {
                     assert_eq!(log.rays(), 0);
                 }
-                for width in Width::ALL {
+                for engine in Engine::all() {
                     for model in [
                         CostModel::default(),
                         CostModel::default()
@@ -412,9 +410,7 @@ fn little_to_learn_from_is_no_trouble() {
                             model,
                             ..Default::default()
                         };
-                        let isa = Isa::best();
-                        let bvh =
-                            Bvh::collapse_logged(&primitives, &tree, &log, &learning, width, isa);
+                        let bvh = Bvh::collapse_logged(&primitives, &tree, &log, &learning, engine);
                         bvh.validate().expect("a valid tree");
                         let report = bvh.report();
                         assert!(report.predicted_cost.expect("a log").is_finite());
@@ -447,8 +443,8 @@ fn a_log_of_another_tree_does_not_fit() {
         (primitives, tree)
     });
     let log = TreeLog::new(&tree_b);
-    let (learning, isa) = (Learning::default(), Isa::best());
-    Bvh::collapse_logged(&a, &tree_a, &log, &learning, Width::W4, isa);
+    let learning = Learning::default();
+    Bvh::collapse_logged(&a, &tree_a, &log, &learning, Engine::default());
 }
 
 /// On a closed convex surface: of the bounces, the half on the inside hits and the half on the outside

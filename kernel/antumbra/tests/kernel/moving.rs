@@ -1,5 +1,6 @@
 //! Scenes that move while rays are traced: every tree against brute force over the scene at the time of the ray.
 
+use antumbra::recipe::Engine;
 use std::sync::Arc;
 
 use antumbra::shapes::Sphere;
@@ -9,7 +10,7 @@ use antumbra::{
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 
-use super::support::{Stripes, cases, cutouts, kernel_rays, quads};
+use super::support::{Stripes, cases, cutouts, engines_for, kernel_rays, quads};
 use super::transforms::{IDENTITY, Transform, product, rotation, scale, transform, translation};
 
 /// A mesh whose keys are the mesh, moved and bent.
@@ -92,17 +93,17 @@ fn check(scene: &Primitives, rng: &mut Rng, rays: &[Ray], what: &str) -> [usize;
             0 => Recipe::default(),
             _ => Recipe::fast(),
         };
-        let mut bvh = Bvh::build(scene, &recipe.width(width)).expect("checked");
+        let mut bvh = Bvh::build(scene, &recipe.engine(Engine::best(width))).expect("checked");
         bvh.set_masks(masks.clone());
         bvh.validate().expect("valid");
         assert!(bvh.report().moves && scene.moves());
-        for isa in antumbra::Isa::available() {
-            bvh.set_isa(isa);
+        for engine in engines_for(bvh.width()) {
+            engine.run(&mut bvh).expect("its width");
             // Two conditions at a time, and all in turns.
             for way in [rng.below(5), rng.below(5)] {
                 let expected = &expected[way];
                 let name = CONDITIONS[way];
-                let what = format!("{what}, {width:?}, {}, {name}", isa.level());
+                let what = format!("{what}, {engine:?}, {name}");
                 let batch = |rays, times, excluded| {
                     let mut batch = bvh.batch(rays).at(times);
                     if way == 1 || way == 4 {

@@ -1,7 +1,9 @@
 //! Every builder x width x order x level equals brute force, ray by ray, bit for bit, on geometry nice
 //! and nasty.
 
-use crate::support::{Odd, config, equals_brute, for_every_tree, geometry, kernel_rays, quads};
+use crate::support::{
+    Odd, config, engines_for, equals_brute, for_every_tree, geometry, kernel_rays, quads,
+};
 use antumbra::recipe::Level;
 use antumbra::shapes::Sphere;
 use antumbra::{Brute, Bvh, Geometry, Isa, Primitives, Ray};
@@ -163,16 +165,14 @@ fn needles_near_the_end_of_an_interval_are_exact() {
         }
         let wanted: Vec<_> = rays.iter().map(|ray| brute.occluded(ray)).collect();
         let mut bvh = Bvh::build(&geometries, &Default::default()).expect("one triangle");
-        for isa in Isa::available() {
-            bvh.set_isa(isa);
+        for engine in engines_for(bvh.width()) {
+            engine.run(&mut bvh).expect("its width");
             let mut found = vec![false; rays.len()];
             bvh.batch(&rays).occluded_into(&mut found);
             for (index, ray) in rays.iter().enumerate() {
                 assert_eq!(
-                    found[index],
-                    wanted[index],
-                    "seed {seed}, {}: {corners:?} {ray:?}",
-                    isa.level()
+                    found[index], wanted[index],
+                    "seed {seed}, {engine:?}: {corners:?} {ray:?}"
                 );
             }
         }

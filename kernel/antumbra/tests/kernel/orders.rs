@@ -2,10 +2,10 @@
 
 use std::panic::AssertUnwindSafe;
 
-use crate::support::{geometry, row};
+use crate::support::{engines_for, geometry, row};
 use antumbra::parts::{Cost, Log, LogKind, Plan, Row, SlotOrder, Steps, Tree};
-use antumbra::recipe::{Collapse, CostModel, Order};
-use antumbra::{Bvh, Error, Isa, Ray, Recipe, Width};
+use antumbra::recipe::{Collapse, CostModel, Engine, Order};
+use antumbra::{Bvh, Error, Ray, Recipe, Width};
 use antumbra_testkit::{Mesh, Rng, mesh};
 
 /// A wall of small triangles before a few large ones: the kind of scene an order matters in.
@@ -32,7 +32,7 @@ fn shadow_rays(rng: &mut Rng, count: usize) -> Vec<Ray> {
 fn build(mesh: &Mesh, width: Width) -> Bvh {
     let options = Recipe::default()
         .collapse(Collapse::Area)
-        .width(width)
+        .engine(Engine::best(width))
         .order(Order::Simple);
     Bvh::build(&[geometry(mesh)], &options).expect("indices in range")
 }
@@ -138,13 +138,12 @@ fn every_level_logs_the_same_occlusions() {
     for width in Width::ALL {
         let mut bvh = build(&mesh, width);
         let best = log(&bvh, kind, &rays);
-        for isa in Isa::available() {
-            bvh.set_isa(isa);
+        for engine in engines_for(bvh.width()) {
+            engine.run(&mut bvh).expect("its width");
             assert_eq!(
                 log(&bvh, kind, &rays).occluded(),
                 best.occluded(),
-                "{}",
-                isa.level()
+                "{engine:?}"
             );
         }
     }

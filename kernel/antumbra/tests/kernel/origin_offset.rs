@@ -1,8 +1,8 @@
 //! Rays that begin an origin offset away from a surface do not visit the leaf they leave.
 
 use antumbra::parts::{BinaryTree, Cost, Steps};
-use antumbra::recipe::{Builder, Collapse};
-use antumbra::{Aabb, Bvh, Geometry, Isa, Primitives, Ray, Width};
+use antumbra::recipe::{Builder, Collapse, Engine};
+use antumbra::{Aabb, Bvh, Geometry, Primitives, Ray};
 use antumbra_testkit::Rng;
 
 /// Cells of a floor along each side.
@@ -56,10 +56,10 @@ fn rays_that_begin_off_a_floor_test_none_of_its_triangles() {
                 (0..500).map(|_| ray()).collect()
             };
             let tree = BinaryTree::build(&primitives, Builder::default());
-            for width in Width::ALL {
-                for isa in Isa::available() {
-                    let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, isa);
-                    let place = format!("axis {axis} at {height} x{width} {}", isa.level());
+            {
+                for engine in Engine::all() {
+                    let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, engine);
+                    let place = format!("axis {axis} at {height} {engine:?}");
                     let rays = leaving(&mut rng, offset);
                     assert_eq!(prim_tests(&bvh, &rays), 0, "{place}");
                     // Nearer ones do, or the offset would be larger than needed.

@@ -6,7 +6,7 @@ use std::thread::{self, ThreadId};
 
 use antumbra::cutout::{Candidate, Opacity};
 use antumbra::inputs::{Column, Distance};
-use antumbra::recipe::Order;
+use antumbra::recipe::{Engine, Order};
 use antumbra::shapes::Sphere;
 use antumbra::{
     Bvh, Error, Geometry, Hit, INVALID_ID, Instance, Primitives, Ray, RayColumns, RayOrder, Recipe,
@@ -24,7 +24,7 @@ fn grid(width: Width, order: Order, count: usize) -> (Bvh, Vec<Ray>) {
     let mut rays = rays::bundles(&mut rng, &mesh, count / 2);
     rays.extend(rays::around(&mut rng, &mesh, count));
     rays.truncate(count);
-    let recipe = Recipe::default().width(width).order(order);
+    let recipe = Recipe::default().engine(Engine::best(width)).order(order);
     let bvh = Bvh::build(&[geometry(&mesh)], &recipe).expect("a mesh");
     (bvh, kernel_rays(&rays))
 }
@@ -143,7 +143,8 @@ fn normals_are_those_of_the_corners() {
         .expect("indices in range");
     let (mut triangles, mut spheres) = (0, 0);
     for width in Width::ALL {
-        let bvh = Bvh::build(&primitives, &Recipe::fast().width(width)).expect("a tree");
+        let bvh =
+            Bvh::build(&primitives, &Recipe::fast().engine(Engine::best(width))).expect("a tree");
         for _ in 0..3000 {
             let ray = Ray::between(rng.point(4.0), rng.point(4.0));
             let Some(hit) = bvh.intersect(&ray) else {

@@ -74,10 +74,10 @@ proptest! {
         };
         let (first, second) = (list(&before, 0), list(&after, 1));
         let rays = kernel_rays(&rays::around(&mut rng, &after[0], 120));
-        for (builder, collapse, (width, isa)) in triples(seed, &BUILDERS, &Collapse::ALL, &ways()) {
+        for (builder, collapse, engine) in triples(seed, &BUILDERS, &Collapse::ALL, &ways()) {
             let order = orders()[rng.below(orders().len())];
-            let recipe = Recipe::default().builder(builder).collapse(collapse).width(width).order(order);
-            let place = format!("seed {seed}, {builder} {collapse} x{width} {order}");
+            let recipe = Recipe::default().builder(builder).collapse(collapse).engine(engine).order(order);
+            let place = format!("seed {seed}, {builder} {collapse} {engine:?} {order}");
             let mut bvh = Bvh::build(&first, &recipe).expect("indices in range");
             prop_assert_eq!(bvh.report().quality, 1.0);
             match bvh.refit(&second) {
@@ -90,7 +90,7 @@ proptest! {
             }
             let rebuilt = Bvh::build(&second, &recipe).expect("indices in range");
             prop_assert_eq!(bvh.bounds(), rebuilt.bounds(), "{}", place);
-            bvh.set_isa(isa);
+            engine.run(&mut bvh).expect("its width");
             check(&bvh, &second, &rays, &place);
             bvh.refit(&first).expect("what it was built over");
             check(&bvh, &first, &rays, &format!("{place}, there and back"));

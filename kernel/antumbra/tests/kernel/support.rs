@@ -7,11 +7,9 @@ use antumbra::parts::{
     BinaryKind, BinaryNode, BinaryTree, Grow, Learning, Log, Pick, Plan, SlotOrder, Steps, Tree,
     TreeLog, binned_subtree,
 };
-use antumbra::recipe::{Builder, Collapse, CostModel, Order, Preset};
+use antumbra::recipe::{Builder, Collapse, CostModel, Engine, Order, Preset};
 use antumbra::shapes::{UserGeometry, UserHit};
-use antumbra::{
-    Aabb, Brute, Build, Bvh, Error, Geometry, Hit, Isa, Primitives, Ray, Recipe, Width,
-};
+use antumbra::{Aabb, Brute, Build, Bvh, Error, Geometry, Hit, Primitives, Ray, Recipe, Width};
 use antumbra_testkit::sample::{self, pairs, triples};
 use antumbra_testkit::{Mesh, Rng, TestRay};
 use proptest::test_runner::{Config as ProptestConfig, RngSeed};
@@ -184,10 +182,16 @@ pub fn orders() -> Vec<Order> {
     Order::ALL.into_iter().chain([BY_RAY]).collect()
 }
 
-/// Every width at every level.
-pub fn ways() -> Vec<(Width, Isa)> {
-    let at_levels = |width| Isa::available().map(move |isa| (width, isa));
-    Width::ALL.into_iter().flat_map(at_levels).collect()
+/// Every engine of the kernel.
+pub fn ways() -> Vec<Engine> {
+    Engine::all().collect()
+}
+
+/// Every engine of the kernel for trees of this width.
+pub fn engines_for(width: Width) -> Vec<Engine> {
+    Engine::all()
+        .filter(|engine| engine.width() == width)
+        .collect()
 }
 
 /// Every collapse, which sorts the children of nodes or does not.
@@ -202,26 +206,22 @@ pub fn for_every_tree(primitives: &Primitives, rays: &[Ray], mut check: impl FnM
     let salt = u64::from(first.to_bits()) << 32 ^ primitives.len() as u64;
     // An interpreter takes its time.
     let most = if cfg!(miri) { 3 } else { usize::MAX };
-    let mut check_at = |mut bvh: Bvh, isa: Isa, tree: &str| {
-        bvh.set_isa(isa);
-        check(&bvh, &format!("{tree} {}", isa.level()));
-    };
-    for (preset, (width, isa)) in pairs(salt, &Preset::ALL, &ways()).into_iter().take(most) {
-        let bvh = Bvh::learn(primitives, rays, &preset.recipe().width(width)).expect("a tree");
-        check_at(bvh, isa, &format!("preset {preset} x{width}"));
+    for (preset, engine) in pairs(salt, &Preset::ALL, &ways()).into_iter().take(most) {
+        let bvh = Bvh::learn(primitives, rays, &preset.recipe().engine(engine)).expect("a tree");
+        check(&bvh, &format!("preset {preset} {engine:?}"));
     }
     let trees = triples(salt, &BUILDERS, &orders(), &ways());
-    for (builder, order, (width, isa)) in trees.into_iter().take(most) {
+    for (builder, order, engine) in trees.into_iter().take(most) {
         let recipe = Recipe::default()
             .builder(builder)
             .collapse(Collapse::Area)
-            .width(width)
+            .engine(engine)
             .seed(7);
         let stage = Build::new(primitives).recipe(&recipe).stage();
         let built = stage.expect("a tree").collapse(&[], &recipe, &());
         let mut bvh = built.expect("nobody stops it");
         bvh.relearn(rays, &recipe.order(order));
-        check_at(bvh, isa, &format!("{builder} x{width} {order}"));
+        check(&bvh, &format!("{builder} {engine:?} {order}"));
     }
 }
 
@@ -237,7 +237,7 @@ pub fn equals_brute_by_builders(name: &str, primitives: &Primitives, rays: &[Ray
 pub fn equals_brute_by(
     builder: Builder,
     collapse: Collapse,
-    (width, isa): (Width, Isa),
+    engine: Engine,
     name: &str,
     primitives: &Primitives,
     rays: &[Ray],
@@ -250,8 +250,8 @@ pub fn equals_brute_by(
         collapse,
         ..Default::default()
     };
-    let bvh = Bvh::collapse_logged(primitives, &tree, &log, &learning, width, isa);
-    let name = format!("{name}, {builder} {collapse} x{width} {}", isa.level());
+    let bvh = Bvh::collapse_logged(primitives, &tree, &log, &learning, engine);
+    let name = format!("{name}, {builder} {collapse} {engine:?}");
     bvh.validate()
         .unwrap_or_else(|broken| panic!("{name}: {broken}"));
     let mut occluded = vec![false; rays.len()];

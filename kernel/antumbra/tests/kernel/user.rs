@@ -1,5 +1,6 @@
 //! User geometry: what is asked of it, what it may answer, and what trees do with it. Scenes of other tests have it, too.
 
+use antumbra::recipe::Engine;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -272,7 +273,8 @@ fn lies_do_no_harm() {
     let list = [geometry(&soup), Geometry::user(100, liar.clone())];
     let rays = kernel_rays(&rays::around(&mut rng, &soup, 300));
     for width in Width::ALL {
-        let mut bvh = Bvh::build(&list, &Recipe::default().width(width)).expect("in range");
+        let mut bvh =
+            Bvh::build(&list, &Recipe::default().engine(Engine::best(width))).expect("in range");
         for round in 0..3 {
             let mut hits = vec![None; rays.len()];
             let mut occluded = vec![false; rays.len()];

@@ -2,8 +2,8 @@
 
 use crate::support::{BUILDERS, geometry, ways};
 use antumbra::parts::{BinaryTree, Steps};
-use antumbra::recipe::{Builder, Collapse};
-use antumbra::{Brute, Bvh, Isa, Primitives, Ray, Width};
+use antumbra::recipe::{Builder, Collapse, Engine};
+use antumbra::{Brute, Bvh, Primitives, Ray};
 use antumbra_testkit::sample::triples;
 use antumbra_testkit::{Mesh, Rng, mesh};
 
@@ -45,7 +45,7 @@ fn rays_at_edges_and_corners_do_not_leak() {
     let meshes: Vec<_> = meshes.iter().collect();
     let runs = triples(seed, &meshes, &BUILDERS, &ways());
     let mut traced = 0;
-    for ((mesh, room), builder, (width, isa)) in &runs {
+    for ((mesh, room), builder, engine) in &runs {
         let primitives = Primitives::new(&[geometry(mesh)]).expect("indices in range");
         let tree = BinaryTree::build(&primitives, *builder);
         let center = if mesh.name == "moved" {
@@ -53,7 +53,7 @@ fn rays_at_edges_and_corners_do_not_leak() {
         } else {
             [0.0; 3]
         };
-        let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, *width, *isa);
+        let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, *engine);
         let mut occluded = vec![false; BATCH];
         for _ in 0..wanted.div_ceil(runs.len() * BATCH) {
             let rays: Vec<_> = (0..BATCH)
@@ -64,9 +64,8 @@ fn rays_at_edges_and_corners_do_not_leak() {
             for (ray, occluded) in rays.iter().zip(&occluded) {
                 assert!(
                     *occluded,
-                    "seed {seed}, {} {builder} x{width} {}: {ray:?}",
+                    "seed {seed}, {} {builder} {engine:?}: {ray:?}",
                     mesh.name,
-                    isa.level()
                 );
             }
         }
@@ -189,13 +188,7 @@ fn thin_bodies_do_not_leak() {
 
 /// Rays from the middle of a mesh, in batches and one by one: all hit what they hit without a tree. Returns the number of
 /// answers.
-fn all_hit(
-    rng: &mut Rng,
-    mesh: &Mesh,
-    builder: Builder,
-    (width, isa): (Width, Isa),
-    name: &str,
-) -> usize {
+fn all_hit(rng: &mut Rng, mesh: &Mesh, builder: Builder, engine: Engine, name: &str) -> usize {
     let primitives = Primitives::new(&[geometry(mesh)]).expect("indices in range");
     let rays: Vec<_> = (0..BATCH)
         .map(|_| aim_anywhere(rng, mesh, [0.0; 3]))
@@ -206,8 +199,8 @@ fn all_hit(
         assert!(found.is_some(), "{name}, no tree: {ray:?}");
     }
     let tree = BinaryTree::build(&primitives, builder);
-    let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, width, isa);
-    let name = format!("{name}, {builder} x{width} {}", isa.level());
+    let bvh = Bvh::collapse(&primitives, &tree, Collapse::Area, engine);
+    let name = format!("{name}, {builder} {engine:?}");
     let mut occluded = vec![false; BATCH];
     let mut hits = vec![None; BATCH];
     bvh.batch(&rays).occluded_into(&mut occluded);

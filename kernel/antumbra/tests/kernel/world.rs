@@ -6,7 +6,7 @@ use crate::instances::{Expected, Scene};
 use crate::support::{Stripes, bits, config, cutouts, geometry, orders, square};
 use crate::transforms::{IDENTITY, transform, translation};
 use antumbra::parts::{Cost, Steps};
-use antumbra::recipe::{Builder, Preset};
+use antumbra::recipe::{Builder, Engine, Preset};
 use antumbra::saved::{Functions, Saved};
 use antumbra::shapes::UserGeometry;
 use antumbra::{Bvh, Error, Geometry, Instance, Object, Primitives, Ray, Recipe, Width, World};
@@ -19,7 +19,7 @@ fn recipe(rng: &mut Rng) -> Recipe {
     let preset = Preset::ALL[rng.below(Preset::ALL.len())];
     let builder = Builder::ALL[rng.below(Builder::ALL.len())];
     let width = Width::ALL[rng.below(Width::ALL.len())];
-    preset.recipe().builder(builder).width(width)
+    preset.recipe().builder(builder).engine(Engine::best(width))
 }
 
 fn build(geometries: &[Geometry<'_>], recipe: &Recipe) -> Object {
@@ -241,7 +241,7 @@ fn errors_leave_the_world_alone() {
         &other.positions[..],
         &other.indices[..1],
     )];
-    let recipe = Recipe::default().width(Width::W8);
+    let recipe = Recipe::default().engine(Engine::best(Width::W8));
     let object = build(&list, &recipe);
     let here = Instance::new(0, IDENTITY);
     let mut world =
@@ -260,7 +260,7 @@ fn errors_leave_the_world_alone() {
         found: 1,
     };
     assert_eq!(world.refit(&[(0, &moved)], &[]), Err(few));
-    let narrow = build(&list, &recipe.width(Width::W4));
+    let narrow = build(&list, &recipe.engine(Engine::best(Width::W4)));
     assert_eq!(
         world.add_object(&narrow),
         Err(Error::OtherWidth {
@@ -323,7 +323,7 @@ fn a_large_ground_moves() {
 #[test]
 fn worlds_keep_what_they_learned() {
     let mut rng = Rng::new(33);
-    let recipe = Recipe::default().width(Width::W8);
+    let recipe = Recipe::default().engine(Engine::best(Width::W8));
     let object = build(&[geometry(&mesh::soup(&mut rng, 200))], &recipe);
     // Many small ones, which nearly all rays miss, and large ones, which occlude them.
     let mut instances = Vec::new();

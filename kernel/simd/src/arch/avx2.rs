@@ -12,6 +12,16 @@ pub struct Avx2(());
 
 impl Simd for Avx2 {
     const LEVEL: Level = Level::Avx2;
+    const LANES: usize = 8;
+
+    #[inline(always)]
+    fn run<const N: usize, Op: WithSimd<N>>(self, op: Op) -> Op::Output
+    where
+        Self: Width<N>,
+    {
+        // SAFETY: the token proves the CPU has the instructions.
+        unsafe { run(op) }
+    }
 
     #[inline(always)]
     fn columns(self, rows: &[[f32; 8]; 16]) -> [Pair<F32x8>; 8] {

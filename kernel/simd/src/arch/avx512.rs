@@ -13,6 +13,16 @@ pub struct Avx512(());
 
 impl Simd for Avx512 {
     const LEVEL: Level = Level::Avx512;
+    const LANES: usize = 16;
+
+    #[inline(always)]
+    fn run<const N: usize, Op: WithSimd<N>>(self, op: Op) -> Op::Output
+    where
+        Self: Width<N>,
+    {
+        // SAFETY: the token proves the CPU has the instructions.
+        unsafe { run(op) }
+    }
 
     #[inline(always)]
     fn compress_within(

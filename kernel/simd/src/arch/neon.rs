@@ -14,6 +14,16 @@ pub struct Neon(());
 
 impl Simd for Neon {
     const LEVEL: Level = Level::Neon;
+    const LANES: usize = 4;
+
+    #[inline(always)]
+    fn run<const N: usize, Op: WithSimd<N>>(self, op: Op) -> Op::Output
+    where
+        Self: Width<N>,
+    {
+        // SAFETY: the token proves the CPU has the instructions.
+        unsafe { run(op) }
+    }
 }
 
 impl Width<4> for Neon {

@@ -4,7 +4,7 @@ use core::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 
 use crate::doubles::Doubles;
 use crate::lanes::{Lanes, Mask};
-use crate::level::{Level, Simd, Width};
+use crate::level::{Level, Simd, Width, WithSimd};
 
 /// Token of [`Level::Scalar`]. Anyone can make one, since every CPU runs plain Rust.
 #[derive(Clone, Copy)]
@@ -12,6 +12,15 @@ pub struct Scalar;
 
 impl Simd for Scalar {
     const LEVEL: Level = Level::Scalar;
+    const LANES: usize = 0;
+
+    #[inline(always)]
+    fn run<const N: usize, Op: WithSimd<N>>(self, op: Op) -> Op::Output
+    where
+        Self: Width<N>,
+    {
+        op.with_simd(self)
+    }
 }
 
 impl<const N: usize> Width<N> for Scalar {

@@ -9,7 +9,7 @@ use core::ops::{Add, BitAnd, BitOr, Div, Mul, Not, Sub};
 use super::pair::Pair;
 use crate::doubles::Doubles;
 use crate::lanes::{Lanes, Mask};
-use crate::level::{Level, Simd, Width};
+use crate::level::{Level, Simd, Width, WithSimd};
 
 /// Token of [`Level::Simd128`].
 #[derive(Clone, Copy)]
@@ -20,6 +20,15 @@ pub const TOKEN: Simd128 = Simd128(());
 
 impl Simd for Simd128 {
     const LEVEL: Level = Level::Simd128;
+    const LANES: usize = 4;
+
+    #[inline(always)]
+    fn run<const N: usize, Op: WithSimd<N>>(self, op: Op) -> Op::Output
+    where
+        Self: Width<N>,
+    {
+        op.with_simd(self)
+    }
 }
 
 impl Width<4> for Simd128 {

@@ -1,8 +1,9 @@
 //! Queues stay short, however many rays one point sends. The time at which they are traced changes nothing.
 
+use antumbra::recipe::Engine;
 use std::sync::Arc;
 
-use antumbra::{Isa, Width};
+use antumbra::Isa;
 use antumbra_scene::{
     AreaLight, DirectStrategy, Geometry, Integrator as Settings, Light, Material, Scene, Shape,
     Sphere, TriangleMesh,
@@ -90,7 +91,7 @@ fn queues_are_bounded_and_when_they_are_traced_changes_no_bit() {
     ] {
         let world = World::new(&scene(settings)).expect("a valid scene");
         let isa = Isa::best();
-        let bvh = world.bvh(Width::auto(isa.level()), isa);
+        let bvh = world.bvh(Engine::of(isa));
         let trace = |mut batch: Batch| {
             let mut integrator = Integrator::new(&world);
             let mut tracer = Tracer::new(&bvh, Observe::Nothing);
@@ -176,7 +177,7 @@ fn lit_floor() -> Scene {
 fn light_samples_in_columns_change_no_bit() {
     let world = World::new(&lit_floor()).expect("a valid scene");
     for isa in Isa::available() {
-        let bvh = world.bvh(Width::auto(isa.level()), isa);
+        let bvh = world.bvh(Engine::of(isa));
         let radiance = |in_columns: bool| {
             let mut integrator = Integrator::new(&world);
             if let Method::Direct(direct) = &mut integrator.method

@@ -28,7 +28,7 @@ impl KeptTree {
     /// The tree of the world's own builder, collapsed by area, in the builder's child order. Nothing is learned.
     pub fn unlearned(world: &World, recipe: &Recipe) -> Self {
         Self {
-            bvh: world.bvh(recipe.width, recipe.isa),
+            bvh: world.bvh(recipe.engine),
             learned: false,
         }
     }

@@ -1,6 +1,7 @@
 //! Layers beside the colours: what the first surface of every camera ray is like, for denoisers and compositing.
 
-use antumbra::{Isa, Width};
+use antumbra::Isa;
+use antumbra::recipe::Engine;
 use antumbra_image::Window;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -66,7 +67,7 @@ impl Layers {
         }
         let [x0, x1, y0, y1] = world.film.pixel_bounds().map(|bound| bound as i32);
         let window = Window { x0, y0, x1, y1 };
-        let bvh = world.bvh(Width::auto(isa.level()), isa);
+        let bvh = world.bvh(Engine::of(isa));
         let moving = world.moving(&bvh)?;
         let sampler = Sampler::new(Method::of(world.sampler.kind, spp), seed);
         let rows: Vec<Vec<Pixel>> = (y0..y1)

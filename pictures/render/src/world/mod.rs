@@ -14,8 +14,8 @@ use std::ops::Deref;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use antumbra::recipe::{Builder, Collapse};
-use antumbra::{Build, BuildMonitor, Bvh, Isa, Primitives, Recipe, Stage, Width};
+use antumbra::recipe::{Builder, Collapse, Engine};
+use antumbra::{Build, BuildMonitor, Bvh, Primitives, Recipe, Stage};
 use antumbra_scene::Scene;
 
 use crate::Error;
@@ -170,8 +170,8 @@ impl World {
     }
 
     /// A wide tree over the scene, collapsed by area, in the child order of the builder.
-    pub fn bvh(&self, width: Width, isa: Isa) -> Bvh {
-        let recipe = Recipe::default().isa(isa).width(width);
+    pub fn bvh(&self, engine: Engine) -> Bvh {
+        let recipe = Recipe::default().engine(engine);
         let bvh = (self.stage(self.builder)).collapse(&[], &recipe.collapse(Collapse::Area), &());
         bvh.expect("nobody stops it")
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::support::*;
+use antumbra::recipe::Engine;
 use antumbra::{Recipe, Width};
 use antumbra_render::{
     Error, Growth, KeptTree, LiveTiles, Monitor, Options, Seen, Snapshot, Task, World, render,
@@ -152,7 +153,7 @@ fn a_picture_made_in_rounds_has_the_same_bits() {
             ..options()
         };
         let reference = render(&world, &options, &()).expect("a picture");
-        let recipe = Recipe::default().width(Width::W8);
+        let recipe = Recipe::default().engine(Engine::best(Width::W8));
         let plain = Arc::new(KeptTree::unlearned(&world, &recipe));
         let lesson = training_rays(&world, &plain, &options, &()).expect("rays");
         assert!(!lesson.rays().is_empty());

@@ -2,7 +2,7 @@
 
 use crate::support::*;
 use antumbra::Width;
-use antumbra::recipe::{Collapse, Order};
+use antumbra::recipe::{Collapse, Engine, Order};
 use antumbra_render::{Error, Options, Rendering, World, render};
 use antumbra_scene::{Film, Filter, Instance, Integrator, Object, Projection, Scene};
 use glam::{Affine3, Mat4, Quat, Vec3};
@@ -220,7 +220,10 @@ fn threads_widths_and_orders_change_no_bit() {
     let reference = run(options(1));
     for width in Width::ALL {
         for order in [Order::Simple, Order::default()] {
-            let recipe = Options::default().recipe.width(width).order(order);
+            let recipe = Options::default()
+                .recipe
+                .engine(Engine::best(width))
+                .order(order);
             let recipe = recipe.collapse(Collapse::Area);
             let rendering = run(Options {
                 recipe,

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::support::*;
 use antumbra::Width;
-use antumbra::recipe::{Collapse, Order};
+use antumbra::recipe::{Collapse, Engine, Order};
 use antumbra_render::{
     Error, Identity, Lesson, Monitor, Options, Place, Rendering, Shard, Snapshot, Task, World,
     render, render_task,
@@ -126,7 +126,7 @@ fn a_rendering_interrupted_again_and_again_has_the_same_bits() {
                     .recipe
                     .order([Order::SortPlus, Order::Simple, Order::Sort][interruptions / 3 % 3])
                     .collapse([Collapse::default(), Collapse::Area][interruptions / 2 % 2])
-                    .width([Width::W4, Width::W8, Width::W16][interruptions % 3]),
+                    .engine(Engine::best(Width::ALL[interruptions % 3])),
                 ..options()
             };
             let stop = Stop::after(patience + interruptions as u64);
@@ -328,7 +328,7 @@ fn identities_name_what_differs() {
 
     // Options that change no bit of the picture make no difference.
     let mut same = options();
-    (same.recipe.order, same.recipe.width) = (Order::Sato, Width::W4);
+    (same.recipe.order, same.recipe.engine) = (Order::Sato, Engine::best(Width::W4));
     (same.threads, same.recipe.collapse) = (None, Collapse::Area);
     assert_eq!(Identity::new(&scene, &same).difference(&identity), None);
 }

@@ -10,8 +10,8 @@ use std::sync::Arc;
 
 use crate::support::heap::{heap, options};
 use crate::support::*;
-use antumbra::recipe::{Builder, Collapse, Order};
-use antumbra::{Isa, Width};
+use antumbra::Width;
+use antumbra::recipe::{Builder, Collapse, Engine, Order};
 use antumbra_render::{Options, World, image_hash, render};
 use antumbra_scene::{
     DirectStrategy, Filter, Geometry, Instance, Integrator, LightStrategy, Object, SamplerKind,
@@ -65,7 +65,7 @@ fn nothing_but_scene_samples_and_seed_changes_a_picture() {
                 .recipe
                 .order(Order::Simple)
                 .collapse(Collapse::Area)
-                .width(Width::W4),
+                .engine(Engine::best(Width::W4)),
             ..options()
         });
         let same = |what: &str, options: Options| {
@@ -112,14 +112,14 @@ fn nothing_but_scene_samples_and_seed_changes_a_picture() {
             };
             same(&format!("{collapse} {order}"), options);
         }
-        let levels: Vec<_> = Isa::available().collect();
-        for (collapse, width, isa) in triples(salt, &Collapse::ALL, &Width::ALL, &levels) {
-            let recipe = options().recipe.isa(isa).collapse(collapse).width(width);
+        let engines: Vec<_> = Engine::all().collect();
+        for (collapse, engine) in pairs(salt, &Collapse::ALL, &engines) {
+            let recipe = options().recipe.engine(engine).collapse(collapse);
             let options = Options {
                 recipe,
                 ..options()
             };
-            same(&format!("{collapse} {width:?} {isa:?}"), options);
+            same(&format!("{collapse} {engine:?}"), options);
         }
         for (collapse, log_share) in pairs(salt, &Collapse::ALL, &[0.0, 0.1, 1.0]) {
             let options = Options {

@@ -1,6 +1,7 @@
 //! Scenes as one mesh, with rays of their camera paths.
 
-use antumbra::{Isa, Ray, Width};
+use antumbra::recipe::Engine;
+use antumbra::{Isa, Ray};
 use antumbra_lab::collect_rays;
 use antumbra_load::{Options, load};
 use antumbra_render::World;
@@ -47,7 +48,7 @@ pub fn read(name: &str) -> Result<Input, Box<dyn std::error::Error>> {
     let scene = load(name.as_ref(), &Options::default())?.scene;
     let world = World::new(&scene)?;
     let isa = Isa::best();
-    let bvh = world.bvh(Width::auto(isa.level()), isa);
+    let bvh = world.bvh(Engine::of(isa));
     let rays = collect_rays(&world, &bvh, RAYS, 1);
     Ok(Input {
         mesh: merged(&scene)?,

@@ -3,6 +3,7 @@
 //! Rows take turns, each behind a copy, and CPU times are medians of turns. A copy is `clone`, of the same value. Memory comes
 //! from the system anew each time, so pages are part of all times.
 
+use antumbra::recipe::Engine;
 use std::hint::black_box;
 
 use antumbra::{Bvh, Geometry, Instance, Object, Recipe, Width, World};
@@ -23,7 +24,7 @@ fn main() {
 fn measure(boxes: usize, width: Width) {
     let (positions, indices) = city(boxes);
     let geometry = [Geometry::triangles(&positions[..], &indices[..])];
-    let recipe = Recipe::fast().surface_rays(Some(0)).width(width);
+    let recipe = Recipe::fast().surface_rays(Some(0)).engine(Engine::best(width));
     let bvh = Bvh::build(&geometry, &recipe).expect("indices in range");
     let object = Object::build(&geometry, &recipe).expect("indices in range");
     let place = |object, x| {

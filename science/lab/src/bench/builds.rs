@@ -1,5 +1,6 @@
 //! Building: seconds and bytes, ours against Embree's, taking turns.
 
+use antumbra_trees::engine;
 use std::num::NonZeroUsize;
 use std::time::{Duration, Instant};
 
@@ -118,8 +119,7 @@ fn build(plan: &Plan, builder: Builder) -> Result<Built, Error> {
     let start = Instant::now();
     let recipe = Recipe::default()
         .builder(builder)
-        .isa(plan.isa)
-        .width(plan.width)
+        .engine(engine(plan.isa, plan.width))
         .clock(Some(clock));
     let primitives = plan.model.primitives()?;
     let checked = start.elapsed();

@@ -312,7 +312,7 @@ impl<'s> Subject<'s> {
         let world = still_world(scene, Builder::default())?;
         watch::check(watcher)?;
         let isa = Isa::best();
-        let bvh = world.bvh(Width::auto(isa.level()), isa);
+        let bvh = world.bvh(antumbra::recipe::Engine::of(isa));
         let timed = collect_rays(&world, &bvh, options.rays, options.seed);
         watch::check(watcher)?;
         // Another seed: what is learned must hold for rays that were not seen.

@@ -4,6 +4,7 @@ use antumbra::parts::{Steps, TreeLog};
 use antumbra::recipe::{Collapse, Order};
 use antumbra::{Build, Bvh, Error, Hit, Isa, Primitives, Ray, Recipe, Stage, Width};
 use antumbra_render::clock;
+use antumbra_trees::engine;
 
 use super::engine::{Answers, Engine, Label, Query, TreeLabel, Work};
 use crate::Rays;
@@ -51,8 +52,7 @@ impl Ingredients {
     ) -> Result<Tree, Error> {
         let recipe = self
             .recipe
-            .isa(isa)
-            .width(width)
+            .engine(engine(isa, width))
             .collapse(collapse)
             .order(order);
         let log = collapse.needs_log().then_some(&self.log);

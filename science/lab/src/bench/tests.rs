@@ -1,5 +1,6 @@
 //! Every engine against a plain loop, on two levels with holes.
 
+use antumbra_trees::engine;
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Opacity, QueryKind};
@@ -210,7 +211,7 @@ fn engines_agree_with_a_plain_loop_about_instances_and_holes() {
     let primitives = model.primitives().expect("few");
     for isa in Isa::available() {
         for width in Width::ALL {
-            let options = Recipe::default().isa(isa).width(width);
+            let options = Recipe::default().engine(engine(isa, width));
             let tree = Tree {
                 bvh: Bvh::build(&primitives, &options).expect("a tree"),
                 label: TreeLabel {

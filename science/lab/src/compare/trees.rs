@@ -53,7 +53,7 @@ type Shape = (Builder, Collapse, Width, u32);
 
 fn shape(builder: Builder, recipe: &Recipe) -> Shape {
     let cost = recipe.costs.prim.to_bits();
-    (builder, recipe.collapse, recipe.width, cost)
+    (builder, recipe.collapse, recipe.engine.width(), cost)
 }
 
 /// A first tree.

@@ -19,6 +19,7 @@ mod replay;
 mod results;
 mod row;
 
+use antumbra_trees::engine;
 use std::collections::HashMap;
 
 use antumbra::Recipe;
@@ -306,15 +307,14 @@ impl<'a> Study<'a> {
                 continue;
             }
             let trained = bench.trained_tree(first)?;
-            let trained_recipe = Recipe::default().isa(self.plan.isa);
             for same_collapse in left.chunk_by(|a, b| a.shares_collapse(b)) {
                 watch::check(self.watcher)?;
                 let plan::Combination {
                     width, collapse, ..
                 } = same_collapse[0].combination;
-                let recipe = trained_recipe
+                let recipe = Recipe::default()
+                    .engine(engine(self.plan.isa, width))
                     .collapse(collapse)
-                    .width(width)
                     .costs(self.plan.costs);
                 let mut collapsed = trained.collapse(&recipe);
                 for replay in same_collapse {

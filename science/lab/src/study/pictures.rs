@@ -1,5 +1,6 @@
 //! The pictures of a study: trees that are compared on one, whole ones for their times, and their files.
 
+use antumbra_trees::engine;
 use std::path::{Path, PathBuf};
 
 use antumbra::Recipe;
@@ -68,11 +69,10 @@ impl Studio<'_> {
 
     fn recipe(&self, combination: &Combination) -> Recipe {
         Recipe::default()
-            .isa(self.plan.isa)
+            .engine(engine(self.plan.isa, combination.width))
             .order(combination.order)
             .builder(combination.tree)
             .collapse(combination.collapse)
-            .width(combination.width)
             .costs(match combination.prim_cost {
                 Some(prim) => self.plan.costs.prim(prim),
                 None => self.plan.costs,

@@ -6,10 +6,11 @@
 //! different moments.
 
 use antumbra::parts::Cost;
+use antumbra::recipe::Engine;
 use antumbra::{Bvh, Isa, Ray, Recipe, Width};
 use antumbra_render::World;
 use antumbra_scene::Camera;
-use antumbra_trees::oracle_visits;
+use antumbra_trees::{engine, oracle_visits};
 
 use super::cameras;
 use super::kinds::{Kind, Trained};
@@ -61,7 +62,7 @@ struct Reference {
 impl<'a> Bench<'a> {
     /// Finds out how many rays the scene has. What is replayed is collected when it is first needed.
     pub fn new(plan: &'a Plan, subject: &'a Subject, world: &'a World) -> Self {
-        let tracing = world.bvh(Width::auto(plan.isa.level()), plan.isa);
+        let tracing = world.bvh(Engine::of(plan.isa));
         let spp = plan.spp_of(subject);
         let mut samples = SampledRays::new(world, &tracing, spp, plan.seed);
         let pilot = samples.take(PILOT, 0);
@@ -265,7 +266,7 @@ impl<'a> Bench<'a> {
 
 impl Reference {
     fn new(world: &World, kind: Kind, width: Width, isa: Isa, rays: &[Ray]) -> Self {
-        let bvh = world.bvh(width, isa);
+        let bvh = world.bvh(engine(isa, width));
         let answers = bvh.batch(rays).occluded();
         Self {
             kind,

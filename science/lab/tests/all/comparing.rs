@@ -1,7 +1,7 @@
 //! Trees that are compared on one picture, against pictures that are rendered one by one.
 
 use crate::support::*;
-use antumbra::recipe::{Builder, Collapse, Order};
+use antumbra::recipe::{Builder, Collapse, Engine, Order};
 use antumbra::{Recipe, Width};
 use antumbra_lab::{Compared, Error, compare};
 use antumbra_render::{Monitor, Options, Phase, render};
@@ -27,7 +27,9 @@ fn recipes() -> Vec<Recipe> {
         area.order(Order::Joint),
         Recipe::default().order(Order::Simple),
         Recipe::default(),
-        Recipe::default().order(Order::Sort).width(Width::W4),
+        Recipe::default()
+            .order(Order::Sort)
+            .engine(Engine::best(Width::W4)),
         Recipe::default().builder(antumbra_trees::SRDH),
         area.builder(antumbra_trees::SRDH).order(Order::SortMinus),
     ]

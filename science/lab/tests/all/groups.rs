@@ -1,7 +1,7 @@
 //! Training rays and held-out rays, and trees of every combination.
 
 use crate::support::*;
-use antumbra::recipe::Order;
+use antumbra::recipe::{Engine, Order};
 use antumbra::{Ray, Recipe, Width};
 use antumbra_lab::{Lot, RaysFrom, SampledRays, TrainedTree};
 use antumbra_render::{Options, render};
@@ -132,7 +132,8 @@ fn every_combination_answers_alike_and_predicts_a_cost() {
     for ((builder, from), collapse, order) in triples(0, &kinds, &COLLAPSES, &ORDERS) {
         let trained = TrainedTree::new(&world, &recipe.builder(builder), &log.shadow, from);
         assert_eq!(trained.builder(), builder);
-        let mut collapsed = trained.collapse(&recipe.collapse(collapse).width(Width::W8));
+        let mut collapsed =
+            trained.collapse(&recipe.collapse(collapse).engine(Engine::best(Width::W8)));
         assert!(collapsed.learned_from() > 0);
         let ordered = collapsed.order(order).expect("an order");
         ordered.bvh.validate().expect("a sound tree");
@@ -147,7 +148,7 @@ fn every_combination_answers_alike_and_predicts_a_cost() {
     }
     // Without rays nothing is learned, and nothing fails.
     let trained = TrainedTree::new(&world, &recipe, &[], RaysFrom::Camera);
-    let mut collapsed = trained.collapse(&recipe.width(Width::W4));
+    let mut collapsed = trained.collapse(&recipe.engine(Engine::best(Width::W4)));
     for order in ORDERS {
         assert!(
             collapsed

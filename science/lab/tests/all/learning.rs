@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::Path;
 
 use antumbra::parts::{Cost, Steps};
-use antumbra::recipe::{Collapse, CostModel};
+use antumbra::recipe::{Collapse, CostModel, Engine};
 use antumbra::{Build, Bvh, Ray, Recipe, Width};
 use antumbra_lab::collect_rays;
 use antumbra_render::World;
@@ -54,7 +54,7 @@ fn check(scene: &Scene) {
     let stage = Build::new(&geometries).stage().expect("indices in range");
     let by_area = recipe.collapse(Collapse::Area);
     let unlearned = |width| {
-        let bvh = stage.collapse(&[], &by_area.width(width), &());
+        let bvh = stage.collapse(&[], &by_area.engine(Engine::best(width)), &());
         bvh.expect("nobody stops it")
     };
     let rays = collect_rays(&world, &unlearned(Width::W8), 2 * RAYS, SEED);
@@ -65,7 +65,7 @@ fn check(scene: &Scene) {
             ("ambient occlusion", &rays.diffuse, &rays.shadow),
         ] {
             let (training, own) = own.split_at(own.len() / 2);
-            let learned = stage.learn(training, &recipe.width(width), &());
+            let learned = stage.learn(training, &recipe.engine(Engine::best(width)), &());
             let learned = learned.expect("nobody stops it");
             let place = format!("{} x{width}, learned from {learned_from}", scene.name);
             for (whose, rays) in [("its own", own), ("the other", &other[..])] {

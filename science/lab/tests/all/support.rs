@@ -1,6 +1,7 @@
 //! A small scene for the tests.
 
-use antumbra::{Bvh, Isa, Width};
+use antumbra::recipe::Engine;
+use antumbra::{Bvh, Width};
 use antumbra_render::World;
 use antumbra_scene::Scene;
 use glam::Vec3;
@@ -23,6 +24,6 @@ pub fn cube_over_floor() -> Scene {
 /// A scene ready to be rendered, and the tree over it.
 pub fn world(scene: &Scene) -> (World, Bvh) {
     let world = World::new(scene).expect("a valid scene");
-    let bvh = world.bvh(Width::W8, Isa::best());
+    let bvh = world.bvh(Engine::best(Width::W8));
     (world, bvh)
 }

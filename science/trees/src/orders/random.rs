@@ -35,7 +35,7 @@ pub(crate) fn plan(tree: &Tree) -> SlotOrder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use antumbra::recipe::{Collapse, Order};
+    use antumbra::recipe::{Collapse, Engine, Order};
     use antumbra::{Build, Geometry, Recipe, Width};
     use antumbra_testkit::{Rng, mesh};
 
@@ -79,7 +79,9 @@ mod tests {
     fn every_slot_is_as_likely() {
         let mesh = mesh::soup(&mut Rng::new(5), 20_000);
         let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
-        let recipe = Recipe::default().collapse(Collapse::Area).width(Width::W4);
+        let recipe = Recipe::default()
+            .collapse(Collapse::Area)
+            .engine(Engine::best(Width::W4));
         let recipe = recipe.order(Order::Other(&SEEN));
         Build::new(&geometry)
             .recipe(&recipe)

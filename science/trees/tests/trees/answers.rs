@@ -8,7 +8,7 @@ use antumbra::cutout::{Candidate, Opacity};
 use antumbra::shapes::Sphere;
 use antumbra::{Brute, Bvh, Geometry, Hit, Instance, Isa, Primitives, Ray, Recipe, Width};
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
-use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS};
+use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS, engine};
 
 use crate::{geometry, kernel_ray};
 
@@ -48,7 +48,11 @@ impl Turns {
                 self.0 += 1;
                 let recipe = Recipe::default().builder(builder).collapse(collapse);
                 let width = Width::ALL[turn % Width::ALL.len()];
-                all.push(recipe.order(ORDERS[turn % ORDERS.len()]).width(width));
+                all.push(
+                    recipe
+                        .order(ORDERS[turn % ORDERS.len()])
+                        .engine(engine(Isa::best(), width)),
+                );
             }
         }
         all
@@ -66,12 +70,12 @@ fn check(name: &str, primitives: &Primitives, rays: &[Ray], turns: &mut Turns) {
             builder,
             collapse,
             order,
-            width,
             ..
         } = recipe;
+        let width = recipe.engine.width();
         let mut bvh = Bvh::learn(primitives, &rays[..rays.len() / 2], &recipe).expect("a tree");
         for isa in Isa::available() {
-            bvh.set_isa(isa);
+            engine(isa, bvh.width()).run(&mut bvh).expect("its width");
             let tree = format!("{builder} {collapse} {order} x{width} {}", isa.level());
             bvh.validate()
                 .unwrap_or_else(|broken| panic!("{name}, {tree}: {broken}"));
@@ -112,7 +116,7 @@ fn every_pair_of_rows_takes_its_turn() {
         builders * collapses
     );
     assert_eq!(
-        pairs(|one| (one.builder.to_string(), one.width.to_string())),
+        pairs(|one| (one.builder.to_string(), one.engine.width().to_string())),
         builders * widths
     );
     assert_eq!(
@@ -120,11 +124,11 @@ fn every_pair_of_rows_takes_its_turn() {
         collapses * orders
     );
     assert_eq!(
-        pairs(|one| (one.collapse.to_string(), one.width.to_string())),
+        pairs(|one| (one.collapse.to_string(), one.engine.width().to_string())),
         collapses * widths
     );
     assert_eq!(
-        pairs(|one| (one.order.to_string(), one.width.to_string())),
+        pairs(|one| (one.order.to_string(), one.engine.width().to_string())),
         orders * widths
     );
 }

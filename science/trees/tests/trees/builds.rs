@@ -1,7 +1,7 @@
 //! Trees: the same for any number of threads, shallow, complete, and back from files.
 
 use antumbra::parts::{Cost, Steps};
-use antumbra::recipe::{Builder, Collapse, Order};
+use antumbra::recipe::{Builder, Collapse, Engine, Order};
 use antumbra::{Bvh, Geometry, Instance, Primitives, Ray, Recipe, Width};
 use antumbra_testkit::{Rng, mesh};
 use antumbra_trees::{BUILDERS, ORDERS, PBRT};
@@ -53,7 +53,9 @@ fn trees_stay_shallow() {
         .collect();
     let geometries = [Geometry::triangles(positions, indices)];
     for builder in BUILDERS {
-        let recipe = Recipe::default().builder(builder).width(Width::W4);
+        let recipe = Recipe::default()
+            .builder(builder)
+            .engine(Engine::best(Width::W4));
         let bvh = Bvh::build(&geometries, &recipe).expect("indices in range");
         bvh.validate().expect("a valid tree");
         assert!(bvh.report().depth <= 94, "{:?}", bvh.report());

@@ -2,12 +2,14 @@
 //!
 //! - [`lists`]: what lists say of their rows
 //! - [`answers`]: every row, in turns with all others, against brute force
+//! - [`engines`]: every width on every instruction set, against the kernel's own
 //! - [`builds`]: trees of every builder are shallow, complete and deterministic
 //! - [`oracle`]: no order beats it
 //! - [`worked_example`]: the order that the book shows how to write
 
 mod answers;
 mod builds;
+mod engines;
 mod lists;
 mod oracle;
 mod worked_example;

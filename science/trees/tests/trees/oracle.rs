@@ -1,7 +1,7 @@
 //! The oracle is a bound for every order.
 
 use antumbra::parts::{Cost, Steps};
-use antumbra::recipe::{Collapse, CostModel, Order};
+use antumbra::recipe::{Collapse, CostModel, Engine, Order};
 use antumbra::{Bvh, Ray, Recipe, Width};
 use antumbra_testkit::{Mesh, Rng, mesh};
 use antumbra_trees::{ORDERS, Visits, oracle_visits, visits};
@@ -26,7 +26,7 @@ fn scene(rng: &mut Rng) -> Mesh {
 fn build(mesh: &Mesh, width: Width) -> Bvh {
     let options = Recipe::default()
         .collapse(Collapse::Area)
-        .width(width)
+        .engine(Engine::best(width))
         .order(Order::Simple);
     Bvh::build(&[geometry(mesh)], &options).expect("indices in range")
 }

@@ -13,7 +13,6 @@ use self::ground::Ground;
 use super::bvh::Bvh;
 use super::child_order::Ranks;
 use super::object::Object;
-use super::recipe::Recipe;
 use crate::INVALID_ID;
 use crate::builder::top_level::{TopChild, TopItem, TopLevel, instance_weight};
 use crate::error::Error;
@@ -23,6 +22,7 @@ use crate::geometry::moved::Moved;
 use crate::geometry::primitives::{MAX_INSTANCES, Primitives};
 use crate::geometry::{Geometry, Instance};
 use crate::parallel::map;
+use crate::trace::engine::Engine;
 use crate::tree::node::Child;
 use crate::tree::refit::TreePlaces;
 use crate::tree::wide::{PlacedTree, Tree};
@@ -210,14 +210,12 @@ impl World {
     ) -> Result<Self, Error> {
         let objects = || objects.iter().map(AsRef::as_ref);
         let first = ground.or(objects().next());
-        let recipe = Recipe::default();
-        let isa = first.map_or(recipe.isa, |object| object.isa());
-        let width = first.map_or(recipe.width, |object| object.width());
+        let engine = first.map_or_else(Engine::default, |object| object.engine);
         let trees = ground.into_iter().chain(objects());
         let trees: Vec<_> = trees.map(|object| &object.tree).collect();
-        let tree = Tree::with_room_for(width, &trees);
+        let tree = Tree::with_room_for(engine.width(), &trees);
         let mut world = Self {
-            bvh: Bvh::fresh(tree, isa, &Primitives::default()),
+            bvh: Bvh::fresh(tree, engine, &Primitives::default()),
             objects: Vec::new(),
             ground: Ground::default(),
             instances: Vec::new(),

@@ -9,11 +9,12 @@ use super::{Joined, World};
 use crate::api::bvh::Bvh;
 use crate::api::child_order::Ranks;
 use crate::api::save::Contents;
+use crate::builder::top_level::TopItem;
 use crate::error::Error;
 use crate::geometry::instance::ObjectShape;
 use crate::geometry::primitives::PrimKind;
 use crate::geometry::{Functions, Instance};
-use crate::tree::node::{ChildKind, Leaf};
+use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::refit::TreePlaces;
 use crate::tree::validate::Walked;
 use crate::tree::wide::Tree;
@@ -88,7 +89,7 @@ impl Contents for World {
             }
             placements[index] = Some(placed.placement);
         }
-        Ok(Self {
+        let world = Self {
             bvh,
             objects,
             top_room: ground.places.nodes.start,
@@ -99,7 +100,54 @@ impl Contents for World {
             // The top level in the file has this order until instances are set.
             ranks: Ranks::default(),
             dropped_before,
-        })
+        };
+        world.of_own_width()
+    }
+}
+
+impl World {
+    /// The world in the width that suits this CPU: see [`Bvh::read`]. The top level is made again.
+    fn of_own_width(mut self) -> Result<Self, Error> {
+        let Some(engine) = self.bvh.other_engine() else {
+            return Ok(self);
+        };
+        let subtrees = self.ground.items.iter_mut().filter_map(TopItem::node);
+        let mut subtrees: Vec<_> = subtrees.collect();
+        let of_ground = subtrees.iter().map(|(index, _)| *index);
+        let of_objects = self.objects.iter().map(|object| object.places.nodes.start);
+        let roots: Vec<_> = of_ground.chain(of_objects).collect();
+        let anew = self.bvh.tree.anew(engine.width(), 1, &roots);
+        let (of_ground, of_objects) = anew.roots.split_at(subtrees.len());
+        for ((_, child), (root, _)) in subtrees.iter_mut().zip(of_ground) {
+            **child = Child::inner(*root as usize);
+        }
+        self.ground.depth = of_ground.iter().map(|(_, depth)| *depth).max().unwrap_or(0);
+        let costs: Vec<_> = (self.objects.iter())
+            .map(|object| self.bvh.tree.sah_at(&object.places))
+            .collect();
+        let starts = of_objects.iter().map(|(root, _)| *root as usize);
+        let ends = starts.clone().skip(1).chain([anew.nodes.len()]);
+        self.ground.places.nodes = 1..starts.clone().next().unwrap_or(anew.nodes.len());
+        for ((object, range), (_, depth)) in self
+            .objects
+            .iter_mut()
+            .zip(starts.zip(ends))
+            .zip(of_objects)
+        {
+            object.places.nodes = range.0..range.1;
+            object.depth = *depth;
+        }
+        let others = subtrees.len();
+        self.bvh.adopt_nodes(anew, engine, others);
+        for (object, before) in self.objects.iter_mut().zip(costs) {
+            let now = self.bvh.tree.sah_at(&object.places);
+            object.built_sah = object.built_sah.map(|built| built * now / before);
+        }
+        (self.top_nodes, self.top_room) = (1, 1);
+        let instances = core::mem::take(&mut self.instances);
+        self.instances.clone_from(&instances);
+        self.place(&instances)?;
+        Ok(self)
     }
 }
 

@@ -1,7 +1,9 @@
+use crate::trace::engine::Engine;
 use alloc::format;
 use alloc::vec;
 use alloc::vec::Vec;
 
+use crate::Bvh;
 use crate::builder::Builder;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::{Geometry, Instance};
@@ -19,7 +21,6 @@ use crate::tree::costs::CostModel;
 use crate::tree::node::MAX_WIDTH;
 use crate::tree::slot_order::SlotOrder;
 use crate::tree::width::Width;
-use crate::{Bvh, Isa};
 use antumbra_testkit::{Rng, mesh};
 
 /// Sums of these are exact; entering an instance is not counted when costs are measured.
@@ -106,8 +107,7 @@ fn trees(seed: u64, check: impl Fn(&str, &Bvh, &[Ray], &Log)) {
                 &primitives,
                 &tree,
                 crate::recipe::Collapse::Area,
-                width,
-                Isa::best(),
+                Engine::best(width),
             );
             let log = log(&bvh, &rays);
             check(&format!("seed {seed} {name} x{width}"), &bvh, &rays, &log);
@@ -167,8 +167,7 @@ fn no_order_of_a_small_node_is_cheaper() {
             &primitives,
             &tree,
             crate::recipe::Collapse::Area,
-            Width::W8,
-            Isa::best(),
+            Engine::best(Width::W8),
         );
         let nodes = &built.tree.nodes;
         let len = nodes.get(0).len();
@@ -228,8 +227,7 @@ fn orders_do_not_depend_on_the_division_of_rays() {
         &primitives,
         &tree,
         crate::recipe::Collapse::Area,
-        Width::W16,
-        Isa::best(),
+        Engine::best(Width::W16),
     );
     let whole = log(&bvh, &rays);
     let mut parts = log(&bvh, &[]);

@@ -81,6 +81,11 @@ pub(crate) struct GroupQuery<'a, const N: usize> {
     pub bvh: &'a WideTree<'a, N>,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [u32],
+    pub part: Part<'a>,
+}
+
+/// What is left of a group.
+pub(crate) struct Part<'a> {
     pub rows: &'a Rows<'a>,
     /// Row to begin with: a multiple of [`RAYS`].
     pub first: usize,
@@ -186,11 +191,14 @@ impl<const N: usize> WithSimd<N> for GroupQuery<'_, N> {
         let Self {
             bvh,
             stack,
-            rows,
-            first,
-            sheaves,
-            mut found,
-            experience,
+            part:
+                Part {
+                    rows,
+                    first,
+                    sheaves,
+                    mut found,
+                    experience,
+                },
         } = self;
         let Experience {
             fans,

@@ -3,7 +3,7 @@
 use std::io::{self, Read};
 use std::sync::Arc;
 
-use antumbra::recipe::Order;
+use antumbra::recipe::{Engine, Order};
 use antumbra::saved::{Functions, Saved};
 use antumbra::{Bvh, Error, Instance, Object, Ray, Recipe, Width, World};
 use antumbra_testkit::{Rng, mesh};
@@ -43,7 +43,7 @@ fn find_every_damage<T: Saved>(what: &str, bytes: &[u8]) {
 #[test]
 fn every_damage_is_found() {
     let (primitives, _) = scene(5, 20);
-    let recipe = Recipe::default().width(Width::W4);
+    let recipe = Recipe::default().engine(Engine::best(Width::W4));
     let bytes = saved(&Bvh::build(&primitives, &recipe).expect("a tree"));
     find_every_damage::<Bvh>("tree", &bytes);
     let soup = mesh::soup(&mut Rng::new(5), 20);
@@ -213,7 +213,9 @@ fn forged_files_do_no_harm() {
     {
         let scene = Scene::new(7 + index as u64, 40);
         let (primitives, rays) = (scene.primitives(), &scene.rays[..]);
-        let recipe = Recipe::default().width(Width::ALL[index]).order(order);
+        let recipe = Recipe::default()
+            .engine(Engine::best(Width::ALL[index]))
+            .order(order);
         let good = saved(&Bvh::learn(&primitives, rays, &recipe).expect("a tree"));
         let (magic, contents) = opened(&good);
         assert_eq!(sealed(&magic, &contents), good);
@@ -240,7 +242,7 @@ fn forged_worlds_do_no_harm() {
     let (mut refused, mut taken) = (0, 0);
     for width in Width::ALL {
         let scene = Scene::new(17, 60);
-        let recipe = Recipe::fast().width(width);
+        let recipe = Recipe::fast().engine(Engine::best(width));
         let world = scene.world(&recipe);
         let good = world.to_bytes();
         let functions = scene.functions::<World>(&good);

@@ -9,7 +9,7 @@ use std::sync::Arc;
 
 use antumbra::cutout::Opacity;
 use antumbra::parts::{Cost, Steps};
-use antumbra::recipe::{Builder, Order};
+use antumbra::recipe::{Builder, Engine, Order};
 use antumbra::saved::{Functions, GeometryId, Saved};
 use antumbra::shapes::{Curves, Sphere, UserGeometry, UserHit};
 use antumbra::{
@@ -17,7 +17,7 @@ use antumbra::{
 };
 use antumbra_testkit::{Mesh, Rng, mesh, rays};
 
-use crate::support::{Odd, Stripes, bits, cutouts, geometry, kernel_rays, quads};
+use crate::support::{Odd, Stripes, bits, cutouts, engines_for, geometry, kernel_rays, quads};
 use crate::transforms::transform;
 use damage::{FRAME, framed, opened};
 
@@ -222,15 +222,99 @@ fn counts(bvh: &Bvh, rays: &[Ray]) -> Vec<Cost> {
     costs
 }
 
+/// Widths that trees keep when they are read here.
+fn kept_widths() -> Vec<Width> {
+    let best = Isa::best();
+    let is_kept = |width: &Width| Engine::new(best, *width).is_ok();
+    Width::ALL.into_iter().filter(is_kept).collect()
+}
+
+/// Trees of widths that are none of this CPU's come back in another, with the same answers in the same order of leaves.
+#[test]
+fn trees_of_other_widths_are_collapsed_anew() {
+    let same = |read: &Bvh, built: &Bvh, rays: &[Ray], place: &str| {
+        read.validate().expect("a sound tree");
+        let best = Engine::default();
+        assert_eq!((read.width(), read.isa()), (best.width(), best.isa()));
+        let [now, before] = [read, built].map(Bvh::report);
+        assert_eq!(now.file_width, Some(built.width()));
+        assert_eq!(
+            (now.primitives, now.leaves, now.training_rays),
+            (before.primitives, before.leaves, before.training_rays)
+        );
+        // The first occluder is the same.
+        assert_eq!(
+            read.batch(rays).occluders(),
+            built.batch(rays).occluders(),
+            "{place}"
+        );
+        for ray in rays {
+            assert_eq!(
+                bits(read.intersect(ray)),
+                bits(built.intersect(ray)),
+                "{place}"
+            );
+        }
+    };
+    for (width, (size, seed)) in (Width::ALL.into_iter())
+        .filter(|width| !kept_widths().contains(width))
+        .flat_map(|width| [(0, 1), (1, 2), (40, 3), (400, 4)].map(|scene| (width, scene)))
+    {
+        let scene = Scene::new(seed, size);
+        let (rays, place) = (&scene.rays[..], format!("{size} x{width}"));
+        let recipe = Recipe::default().engine(Engine::best(width));
+        let built = Bvh::learn(&scene.primitives(), rays, &recipe).expect("a tree");
+        let mut read: Bvh = scene.read(&saved(&built));
+        same(&read, &built, rays, &place);
+        let again: Bvh = scene.read(&saved(&read));
+        assert_eq!(saved(&again), saved(&read));
+        if size == 0 {
+            continue;
+        }
+        let mesh = [geometry(&scene.soup)];
+        read = Bvh::build(&mesh, &recipe).expect("in range");
+        read.refit(&mesh).expect("as before");
+        let refitted = Bvh::from_bytes(&saved(&read)).expect("a file of ours");
+        assert!((refitted.report().quality / read.report().quality - 1.0).abs() < 1e-6);
+        let lists = scene.objects();
+        let mut world = scene.world(&recipe);
+        let mut loaded: World = scene.read(&world.to_bytes());
+        let check = |loaded: &World, instances: &[Instance]| {
+            loaded.validate().expect("a sound tree");
+            let all = Primitives::with_instances(&scene.ground(), &scene.objects(), instances);
+            let brute = Brute::new(&all.expect("in range"));
+            for ray in rays {
+                let hit = loaded.intersect(ray);
+                assert_eq!(bits(hit), bits(brute.intersect(ray)), "{place}");
+                assert_eq!(loaded.occluded(ray), brute.occluded(ray), "{place}");
+            }
+        };
+        check(&loaded, &scene.instances);
+        let mut rng = Rng::new(19);
+        let mut many = scene.instances.clone();
+        many.extend((0..150).map(|index| Instance::new(index % 2, transform(&mut rng))));
+        loaded.set_instances(&many).expect("objects are there");
+        check(&loaded, &many);
+        for world in [&mut loaded, &mut world] {
+            let moved = world.refit(&[(World::GROUND, &scene.ground()), (1, &lists[1])], &many);
+            moved.expect("as before");
+        }
+        check(&loaded, &many);
+        assert!((loaded.quality(1) / world.quality(1) - 1.0).abs() < 1e-6);
+        let again: World = scene.read(&loaded.to_bytes());
+        assert_eq!(again.to_bytes(), loaded.to_bytes());
+    }
+}
+
 #[test]
 fn saved_trees_answer_as_built_ones_at_the_same_cost() {
     for (size, seed) in [(0, 1), (1, 2), (40, 3), (400, 4)] {
         let scene = Scene::new(seed, size);
         let (primitives, rays) = (scene.primitives(), &scene.rays[..]);
         let brute = Brute::new(&primitives);
-        for width in Width::ALL {
+        for width in kept_widths() {
             for order in [Order::Joint, Order::Simple] {
-                let recipe = Recipe::default().width(width).order(order);
+                let recipe = Recipe::default().engine(Engine::best(width)).order(order);
                 let built = Bvh::learn(&primitives, rays, &recipe).expect("a tree");
                 let bytes = saved(&built);
                 let mut read: Bvh = scene.read(&bytes);
@@ -243,8 +327,8 @@ fn saved_trees_answer_as_built_ones_at_the_same_cost() {
                 assert!(report.depth <= expected.depth);
                 report.depth = expected.depth;
                 assert_eq!(report, expected);
-                for isa in Isa::available() {
-                    read.set_isa(isa);
+                for engine in engines_for(read.width()) {
+                    engine.run(&mut read).expect("its width");
                     let mut occluded = vec![false; rays.len()];
                     read.batch(rays).occluded_into(&mut occluded);
                     for (ray, occluded) in rays.iter().zip(occluded) {
@@ -261,12 +345,12 @@ fn saved_trees_answer_as_built_ones_at_the_same_cost() {
 /// A loaded world answers as the original, and as brute force, and goes on doing so when it moves.
 #[test]
 fn loaded_worlds_move_like_the_original() {
-    for (width, size) in Width::ALL
+    for (width, size) in kept_widths()
         .into_iter()
         .flat_map(|width| [(width, 20), (width, 400)])
     {
         let scene = Scene::new(18, size);
-        let recipe = Recipe::default().width(width);
+        let recipe = Recipe::default().engine(Engine::best(width));
         let mut world = scene.world(&recipe);
         world.relearn(&scene.rays, &recipe);
         let file = world.to_bytes();
@@ -334,8 +418,8 @@ fn loaded_objects_are_placed_as_the_original() {
     let functions = Functions::new()
         .filters(vec![scene.filters[2].clone()])
         .shapes(vec![Arc::new(scene.shapes[2].clone())]);
-    for width in Width::ALL {
-        let recipe = Recipe::default().width(width);
+    for width in kept_widths() {
+        let recipe = Recipe::default().engine(Engine::best(width));
         let mut built = Object::build(&list, &recipe).expect("in range");
         let mut file = Vec::new();
         built.write(&mut file).expect("a vector takes anything");
@@ -365,7 +449,7 @@ fn loaded_objects_are_placed_as_the_original() {
 fn trees_of_every_builder_come_back() {
     let mesh = mesh::soup(&mut Rng::new(25), 300);
     for builder in Builder::ALL {
-        let recipe = Recipe::default().builder(builder).width(Width::W8);
+        let recipe = Recipe::default().builder(builder);
         let built = Bvh::build(&[geometry(&mesh)], &recipe).expect("in range");
         let file = saved(&built);
         let read = Bvh::from_bytes(&file).expect("a file of ours");
@@ -419,8 +503,10 @@ fn long_files_come_in_pieces() {
         }
     }
     let (primitives, _) = scene(22, 20_000);
-    for width in Width::ALL {
-        let recipe = Recipe::fast().surface_rays(Some(0)).width(width);
+    for width in kept_widths() {
+        let recipe = Recipe::fast()
+            .surface_rays(Some(0))
+            .engine(Engine::best(width));
         let bvh = Bvh::build(&primitives, &recipe).expect("a tree");
         let file = saved(&bvh);
         assert!(file.len() > 20 * 4 * FRAME, "{}", file.len());
@@ -441,17 +527,27 @@ fn long_files_come_in_pieces() {
 #[test]
 fn files_can_follow_each_other() {
     let (primitives, _) = scene(9, 30);
-    let first =
-        saved(&Bvh::build(&primitives, &Recipe::default().width(Width::W4)).expect("a tree"));
-    let second =
-        saved(&Bvh::build(&primitives, &Recipe::default().width(Width::W8)).expect("a tree"));
+    let first = saved(
+        &Bvh::build(
+            &primitives,
+            &Recipe::default().engine(Engine::best(Width::W4)),
+        )
+        .expect("a tree"),
+    );
+    let second = saved(
+        &Bvh::build(
+            &primitives,
+            &Recipe::default().engine(Engine::best(Width::W8)),
+        )
+        .expect("a tree"),
+    );
     let both = [&first[..], &second, b"more"].concat();
     let mut input = &both[..];
-    assert_eq!(Bvh::read(&mut input).expect("the first").width(), Width::W4);
-    assert_eq!(
-        Bvh::read(&mut input).expect("the second").width(),
-        Width::W8
-    );
+    for width in [Width::W4, Width::W8] {
+        let report = Bvh::read(&mut input).expect("a tree").report();
+        let is_kept = kept_widths().contains(&width);
+        assert_eq!(report.file_width, (!is_kept).then_some(width));
+    }
     assert_eq!(input, b"more");
 }
 
