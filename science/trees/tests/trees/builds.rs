@@ -21,7 +21,10 @@ fn trees_do_not_depend_on_the_number_of_threads() {
         .collect();
     for (turn, builder) in BUILDERS.into_iter().enumerate() {
         let order = ORDERS[turn % ORDERS.len()];
-        let recipe = Recipe::default().builder(builder).order(order);
+        let recipe = Recipe::default()
+            .builder(builder)
+            .order(order)
+            .surface_rays(Some(5000));
         let built = [1, 5].map(|threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             pool.build().expect("threads").install(|| {
@@ -88,7 +91,10 @@ fn trees_come_back_from_files() {
     let mesh = mesh::soup(&mut Rng::new(25), 300);
     for (turn, builder) in BUILDERS.into_iter().enumerate() {
         let order = ORDERS[turn % ORDERS.len()];
-        let recipe = Recipe::default().builder(builder).order(order);
+        let recipe = Recipe::default()
+            .builder(builder)
+            .order(order)
+            .surface_rays(Some(5000));
         let file = Bvh::build(&[geometry(&mesh)], &recipe)
             .expect("in range")
             .to_bytes();
