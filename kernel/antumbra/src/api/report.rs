@@ -60,7 +60,7 @@ pub struct BuildReport {
     pub moves: bool,
     /// Whether batches prefetch nodes and leaves: see [`Recipe::prefetch`](crate::Recipe::prefetch).
     pub prefetches: bool,
-    /// The width that the tree has in the file it was read from, if that is not [`Bvh::width`]: the tree was collapsed anew.
+    /// The width that the tree has in the file it was read from, if that is not [`Bvh::width`]: the tree was collapsed again.
     pub file_width: Option<Width>,
     /// Times of the steps; `None` without a [clock](crate::Recipe::clock).
     pub times: Option<BuildTimes>,

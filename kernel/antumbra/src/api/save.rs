@@ -13,8 +13,8 @@ use crate::error::Error;
 use crate::geometry::Functions;
 use crate::trace::engine::Engine;
 use crate::trace::memory::Pool;
-use crate::tree::anew::Anew;
 use crate::tree::costs::CostModel;
+use crate::tree::recollapse::Recollapsed;
 use crate::tree::validate::Walked;
 use crate::tree::wide::Tree;
 use crate::tree::width::Width;
@@ -113,7 +113,7 @@ impl Bvh {
     }
 
     /// Reads a tree that [`Bvh::write`] wrote, for the best instruction set of this CPU. A tree of a width that this does not
-    /// have is collapsed anew, with the leaves in the order that was learned; [`BuildReport::file_width`] says so. Takes no byte
+    /// have is collapsed again, with the leaves in the order that was learned; [`BuildReport::file_width`] says so. Takes no byte
     /// behind its end. Give any reader, buffered or not.
     ///
     /// Files are not trusted. A wrong checksum is an error, and so is a file with a right one whose tree would let a query
@@ -165,10 +165,10 @@ impl Bvh {
         };
         let mut roots = vec![0];
         roots.extend(self.tree.roots.iter().map(|root| *root as usize));
-        let anew = self.tree.anew(engine.width(), 0, &roots);
-        let deepest = anew.roots[1..].iter().map(|(_, depth)| *depth);
-        self.tree.depth = anew.roots[0].1 + deepest.max().unwrap_or(0);
-        self.adopt_nodes(anew, engine, 1);
+        let recollapsed = self.tree.recollapse(engine.width(), 0, &roots);
+        let deepest = recollapsed.roots[1..].iter().map(|(_, depth)| *depth);
+        self.tree.depth = recollapsed.roots[0].1 + deepest.max().unwrap_or(0);
+        self.adopt_nodes(recollapsed, engine, 1);
         self
     }
 
@@ -179,11 +179,14 @@ impl Bvh {
     }
 
     /// Takes nodes of another width, of which the roots of objects come behind so many others.
-    pub(super) fn adopt_nodes(&mut self, anew: Anew, engine: Engine, others: usize) {
+    pub(super) fn adopt_nodes(&mut self, recollapsed: Recollapsed, engine: Engine, others: usize) {
         let before = self.tree.sah(&CostModel::default());
         self.file_width = Some(self.width());
-        self.tree.nodes = anew.nodes;
-        let roots: Vec<_> = anew.roots[others..].iter().map(|(root, _)| *root).collect();
+        self.tree.nodes = recollapsed.nodes;
+        let roots: Vec<_> = recollapsed.roots[others..]
+            .iter()
+            .map(|(root, _)| *root)
+            .collect();
         for placed in &mut self.tree.instances {
             if let Ok(object) = self.tree.roots.binary_search(&placed.root) {
                 placed.root = roots[object];

@@ -3,7 +3,7 @@
 //! - `binary`: the binary tree that every builder makes;  `costs`: what a node and a primitive cost
 //! - `node`: a node of N children and its references to them;  `nodes`: a list of nodes of any width
 //! - `wide`: the N-wide tree;  `leaves`: its leaf blocks by kind
-//! - `anew`: a tree of one width made from a tree of another
+//! - `recollapse`: a tree of one width made from a tree of another
 //! - `arena`: a tree put together from trees of objects;  `refit`: boxes and leaf blocks of primitives that moved
 //! - `validate`: a check of every promise of the wide tree;  `statistics`: its bytes and its cost
 //! - `width`: how many children a node has;  `any`: the switch between widths
@@ -11,7 +11,6 @@
 //! - `saved`: trees as words of a file, see [`crate::words`]
 //! - `slot_order`: a permutation of the slots of a tree
 
-pub(crate) mod anew;
 pub(crate) mod any;
 pub(crate) mod arena;
 pub(crate) mod binary;
@@ -20,6 +19,7 @@ pub(crate) mod leaves;
 pub(crate) mod motion;
 pub(crate) mod node;
 pub(crate) mod nodes;
+pub(crate) mod recollapse;
 pub(crate) mod refit;
 pub(crate) mod saved;
 pub(crate) mod slot_order;

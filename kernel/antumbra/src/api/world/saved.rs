@@ -116,8 +116,8 @@ impl World {
         let of_ground = subtrees.iter().map(|(index, _)| *index);
         let of_objects = self.objects.iter().map(|object| object.places.nodes.start);
         let roots: Vec<_> = of_ground.chain(of_objects).collect();
-        let anew = self.bvh.tree.anew(engine.width(), 1, &roots);
-        let (of_ground, of_objects) = anew.roots.split_at(subtrees.len());
+        let recollapsed = self.bvh.tree.recollapse(engine.width(), 1, &roots);
+        let (of_ground, of_objects) = recollapsed.roots.split_at(subtrees.len());
         for ((_, child), (root, _)) in subtrees.iter_mut().zip(of_ground) {
             **child = Child::inner(*root as usize);
         }
@@ -126,8 +126,8 @@ impl World {
             .map(|object| self.bvh.tree.sah_at(&object.places))
             .collect();
         let starts = of_objects.iter().map(|(root, _)| *root as usize);
-        let ends = starts.clone().skip(1).chain([anew.nodes.len()]);
-        self.ground.places.nodes = 1..starts.clone().next().unwrap_or(anew.nodes.len());
+        let ends = starts.clone().skip(1).chain([recollapsed.nodes.len()]);
+        self.ground.places.nodes = 1..starts.clone().next().unwrap_or(recollapsed.nodes.len());
         for ((object, range), (_, depth)) in self
             .objects
             .iter_mut()
@@ -138,7 +138,7 @@ impl World {
             object.depth = *depth;
         }
         let others = subtrees.len();
-        self.bvh.adopt_nodes(anew, engine, others);
+        self.bvh.adopt_nodes(recollapsed, engine, others);
         for (object, before) in self.objects.iter_mut().zip(costs) {
             let now = self.bvh.tree.sah_at(&object.places);
             object.built_sah = object.built_sah.map(|built| built * now / before);

@@ -1,4 +1,4 @@
-//! A tree from a file collapsed anew, for nodes of another width: leaves stay where they are, and so does the order in which
+//! A tree from a file collapsed again, for nodes of another width: leaves stay where they are, and so does the order in which
 //! an occlusion query comes to them, which was learned.
 //!
 //! A node with too many children gets nodes between itself and neighbours in its order, those whose common box is smallest.
@@ -13,8 +13,8 @@ use super::wide::Tree;
 use super::width::Width;
 use crate::aabb::Aabb;
 
-/// Nodes of trees that were collapsed anew.
-pub(crate) struct Anew {
+/// Nodes of trees that were collapsed again.
+pub(crate) struct Recollapsed {
     pub nodes: Nodes,
     /// The root of each tree, and how many levels of nodes it has.
     pub roots: Vec<(u32, usize)>,
@@ -37,7 +37,7 @@ struct Job {
 
 impl Tree {
     /// The trees below these nodes, one behind the other and behind `first` empty nodes.
-    pub(crate) fn anew(&self, width: Width, first: usize, roots: &[usize]) -> Anew {
+    pub(crate) fn recollapse(&self, width: Width, first: usize, roots: &[usize]) -> Recollapsed {
         let mut nodes = Nodes::with_capacity(width, first + self.nodes.len());
         nodes.resize(first);
         let mut made = Vec::with_capacity(roots.len());
@@ -80,7 +80,7 @@ impl Tree {
             }
             made.push((start, depth));
         }
-        Anew { nodes, roots: made }
+        Recollapsed { nodes, roots: made }
     }
 
     /// As many items as a node of so many slots can have, and no more.
