@@ -220,10 +220,7 @@ impl<'a> Batch<'a> {
     pub fn occluded_into(self, occluded: &mut [bool]) {
         assert_eq!(self.rays.len(), occluded.len(), "one answer per ray");
         if occluded.len() < FEW {
-            return self.each(occluded, |moment, ray, condition| match condition {
-                None => moment.occluded(ray),
-                Some(condition) => moment.occluded_when(ray, condition),
-            });
+            return self.each(occluded, Moment::occluded_when);
         }
         self.occluded_range(0..occluded.len(), occluded);
     }
@@ -267,13 +264,7 @@ impl<'a> Batch<'a> {
     pub fn intersect_into(self, hits: &mut [Option<Hit>]) {
         assert_eq!(self.rays.len(), hits.len(), "one answer per ray");
         if hits.len() < FEW {
-            return self.each(hits, |moment, ray, condition| {
-                let closest = moment.intersect(ray);
-                match condition {
-                    None => closest,
-                    Some(condition) => moment.closest_when(ray, condition, closest),
-                }
-            });
+            return self.each(hits, Moment::closest_when);
         }
         let range = 0..hits.len();
         self.run_range(
@@ -346,21 +337,11 @@ impl<'a> Batch<'a> {
         );
     }
 
-    /// Answers a few rays one by one, with their conditions if there are any.
-    fn each<A>(
-        &self,
-        answers: &mut [A],
-        answer: impl Fn(Moment<'_>, &Ray, Option<&Condition<'_>>) -> A,
-    ) {
-        let is_plain = self.conditions.are_none();
+    /// Answers a few rays one by one, under their conditions.
+    fn each<A>(&self, answers: &mut [A], answer: impl Fn(Moment<'a>, &Ray, &Condition<'_>) -> A) {
         for (place, found) in answers.iter_mut().enumerate() {
             let (moment, ray) = (self.moment(place), self.ray(place));
-            *found = match is_plain {
-                true => answer(moment, &ray, None),
-                false => {
-                    (self.conditions).with(place, |condition| answer(moment, &ray, Some(condition)))
-                }
-            };
+            *found = (self.conditions).with(place, |condition| answer(moment, &ray, condition));
         }
     }
 

@@ -1,6 +1,7 @@
 //! Trees of scenes that move, and the moment at which a ray looks at them.
 
 use alloc::vec::Vec;
+use core::cell::Cell;
 
 use antumbra_simd::scratch::Bits;
 
@@ -11,10 +12,10 @@ use crate::geometry::primitives::Primitives;
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
-use crate::trace::engine::{Table, Traces};
+use crate::trace::engine::{Each, Table};
 use crate::trace::memory::Stored;
-use crate::trace::packet::PacketQuery;
-use crate::trace::query::{Closest, Occlusion};
+use crate::trace::query::{Located, Occluder, Query};
+use crate::trace::ray_batch::{RayBatch, Report};
 use crate::trace::visit::{Ahead, Visit};
 
 /// Scenes that move while rays are traced: see [`Geometry::moving`](crate::Geometry::moving) and
@@ -104,54 +105,43 @@ pub(super) struct Moment<'a> {
 }
 
 impl Moment<'_> {
-    fn one<Q: PacketQuery<Item: Stored + Bits>>(self, ray: &Ray) -> Q::Answer
+    /// A query of one ray under a condition.
+    fn one<Q: Query<Item: Stored + Bits>>(
+        self,
+        ray: &Ray,
+        condition: &Condition<'_>,
+        report: Report<'_>,
+    ) -> Q::Answer
     where
-        dyn Table: Traces<Q>,
+        dyn Table: Each<Q>,
     {
-        self.bvh
-            .one::<Q>(ray, self.share.as_ref().map(core::slice::from_ref))
-    }
-
-    /// Whether anything occludes a ray.
-    pub fn occluded(self, ray: &Ray) -> bool {
-        match self.share {
-            None => self.bvh.occluded(ray),
-            Some(_) => self.one::<Occlusion>(ray),
-        }
-    }
-
-    /// The closest hit of a ray.
-    pub fn intersect(self, ray: &Ray) -> Option<Hit> {
-        self.one::<Closest>(ray)
+        let batch = RayBatch::new(core::slice::from_ref(ray), 0).when(condition);
+        let batch = batch.at(self.share.as_ref().map(core::slice::from_ref));
+        self.bvh.one::<Q>(ray, Some(&batch.reporting(report)))
     }
 
     /// Whether anything that satisfies a condition occludes a ray.
     pub fn occluded_when(self, ray: &Ray, condition: &Condition<'_>) -> bool {
-        if condition.is_none() {
-            return self.occluded(ray);
+        match self.share.is_none() && condition.is_none() {
+            true => self.bvh.occluded(ray),
+            false => self.one::<Occluder>(ray, condition, Report::Nothing),
         }
-        self.occluder_when(ray, condition).is_some()
     }
 
     /// The first occluder found that satisfies a condition.
     pub fn occluder_when(self, ray: &Ray, condition: &Condition<'_>) -> Option<PrimId> {
-        self.bvh.with_stack(|stack: &mut [u32]| {
-            let table = self.bvh.engine.0;
-            table.occluder_when(&self.bvh.tree, self.share, stack, ray, condition)
-        })
+        let found = Cell::new(None);
+        let report = |_: usize, occluder| found.set(Some(occluder));
+        self.one::<Occluder>(ray, condition, Report::Occluder(&report));
+        found.get()
     }
 
-    /// The closest hit that satisfies a condition, given the closest one of all.
-    pub fn closest_when(
-        self,
-        ray: &Ray,
-        condition: &Condition<'_>,
-        closest: Option<Hit>,
-    ) -> Option<Hit> {
-        if closest.is_none_or(|hit| condition.counts(&hit)) {
-            return closest;
+    /// The closest hit that satisfies a condition.
+    pub fn closest_when(self, ray: &Ray, condition: &Condition<'_>) -> Option<Hit> {
+        match self.share.is_none() && condition.is_none() {
+            true => self.bvh.intersect(ray),
+            false => self.one::<Located<true>>(ray, condition, Report::Nothing),
         }
-        self.visit_when(ray, condition, &mut |_| Visit::Accept)
     }
 
     /// Calls `visit` with the hits that satisfy a condition, front to back.

@@ -11,18 +11,15 @@ use super::moving::Moment;
 use crate::geometry::ray_setup::RaySetup;
 use crate::learn::ray_log::{Following, RayLog};
 use crate::ray::{Hit, Ray};
-use crate::trace::closest_with_leaf::closest_with_leaf;
-use crate::trace::engine::{Streams, Table, Traces};
+use crate::trace::engine::{Each, Packs, Streams, Table};
 use crate::trace::memory::{Memory, Stored};
 use crate::trace::observe::{Cost, Counting, Nothing, Observer};
 use crate::trace::packet::PacketQuery;
 use crate::trace::pick::Pick;
-use crate::trace::query::{Closest, Occlusion, StreamQuery};
+use crate::trace::query::{Closest, Located, Occluder, Occlusion, Query};
 use crate::trace::ray_batch::RayBatch;
 use crate::trace::stack::stack_size;
 use crate::trace::stream;
-use crate::trace::view::on_view;
-use crate::tree::any::on_tree;
 
 /// Fewer rays than this are not worth a stream.
 pub(super) const FEW: usize = 12;
@@ -42,20 +39,12 @@ impl Bvh {
         occluded: &mut [bool],
     ) {
         assert_eq!(batch.rays.len(), occluded.len(), "one answer per ray");
-        if self.is_worth_a_stream(batch.rays.len()) && self.tree.pick.is_none() {
-            return self.many::<Occlusion>(memory, batch, occluded);
-        }
-        if !batch.decides() {
-            return self.occluded_each(memory, batch, occluded);
-        }
-        for (index, occluded) in occluded.iter_mut().enumerate() {
-            let (ray, moment) = (&batch.rays[index], self.moment_of(batch, index));
-            let occluder =
-                batch.with_condition(index, |condition| moment.occluder_when(ray, condition));
-            *occluded = occluder.is_some();
-            if let Some(occluder) = occluder {
-                batch.report_occluder(index, occluder);
-            }
+        let goes_together = self.is_worth_a_stream(batch.rays.len()) && self.tree.pick.is_none();
+        match (goes_together, batch.is_conditional()) {
+            (true, false) => self.many::<Occlusion, Occlusion>(memory, batch, occluded),
+            (true, true) => self.many::<Occlusion, Occluder>(memory, batch, occluded),
+            (false, false) => self.occluded_each(memory, batch, occluded),
+            (false, true) => self.each::<Occluder>(memory, batch, occluded),
         }
     }
 
@@ -67,45 +56,17 @@ impl Bvh {
         hits: &mut [Option<Hit>],
     ) {
         assert_eq!(batch.rays.len(), hits.len(), "one answer per ray");
-        if self.is_worth_a_stream(batch.rays.len()) {
-            return self.many::<Closest>(memory, batch, hits);
-        }
-        if batch.reports_surfaces() {
-            return match self.isa().level() {
-                Level::Scalar => self.closest_with_leaves(memory, batch, hits),
-                // Streams report leaves, single rays do not.
-                _ => self.many::<Closest>(memory, batch, hits),
-            };
-        }
-        self.each::<Closest>(memory, batch, hits);
-        if batch.decides() {
-            for (index, hit) in hits.iter_mut().enumerate() {
-                let (ray, moment) = (&batch.rays[index], self.moment_of(batch, index));
-                *hit = batch
-                    .with_condition(index, |condition| moment.closest_when(ray, condition, *hit));
-            }
-        }
-    }
-
-    /// Closest hits ray by ray, with reports of their leaves.
-    fn closest_with_leaves(
-        &self,
-        memory: &mut Memory,
-        batch: &RayBatch<'_>,
-        hits: &mut [Option<Hit>],
-    ) {
-        let stack: &mut [u64] =
-            Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
-        for (index, (ray, hit)) in batch.rays.iter().zip(hits).enumerate() {
-            let found = batch.with_condition(index, |condition| {
-                on_tree!(&self.tree, bvh => on_view!(batch.share(index), view => {
-                    closest_with_leaf((bvh, view), stack, ray, condition)
-                }))
-            });
-            *hit = found.map(|found| found.hit.told());
-            if let Some(found) = found {
-                batch.report_surface(index, &found);
-            }
+        let goes_together = self.is_worth_a_stream(batch.rays.len());
+        match (
+            goes_together,
+            batch.is_conditional(),
+            batch.reports_surfaces(),
+        ) {
+            (true, false, false) => self.many::<Closest, Closest>(memory, batch, hits),
+            (true, false, true) => self.many::<Closest, Located<false>>(memory, batch, hits),
+            (true, true, _) => self.many::<Closest, Located<true>>(memory, batch, hits),
+            (false, false, false) => self.each::<Closest>(memory, batch, hits),
+            (false, ..) => self.each::<Located<true>>(memory, batch, hits),
         }
     }
 
@@ -153,14 +114,14 @@ impl Bvh {
         (self.engine.0).observe(&self.tree, stack, observer, rays, answers);
     }
 
-    /// A query of many rays: first in packets, then in streams what these leave over.
-    fn many<Q: PacketQuery<Item: Stored>>(
+    /// A query of many rays: `Q` first in packets, then `R` in streams of what these leave over.
+    fn many<Q: PacketQuery<Item: Stored>, R: Query<Item: Stored, Answer = Q::Answer>>(
         &self,
         memory: &mut Memory,
         batch: &RayBatch<'_>,
         answers: &mut [Q::Answer],
     ) where
-        dyn Table: Traces<Q>,
+        dyn Table: Packs<Q> + Streams<R>,
     {
         let mut pending = core::mem::take(&mut memory.pending);
         // The list of pending rays stays in the cache.
@@ -170,7 +131,7 @@ impl Bvh {
             pending.clear();
             self.packets::<Q>(memory, batch, answers, &mut pending);
             if !pending.is_empty() {
-                self.stream::<Q>(memory, batch, &pending, answers);
+                self.stream::<R>(memory, batch, &pending, answers);
             }
         }
         memory.pending = pending;
@@ -184,7 +145,7 @@ impl Bvh {
         answers: &mut [Q::Answer],
         pending: &mut Vec<u32>,
     ) where
-        dyn Table: Traces<Q>,
+        dyn Table: Packs<Q>,
     {
         if batch.shares().is_some() {
             return pending.extend(0..batch.rays.len() as u32);
@@ -194,25 +155,7 @@ impl Bvh {
     }
 
     /// Answers the pending rays in a stream.
-    pub(super) fn stream<Q: PacketQuery<Item: Stored>>(
-        &self,
-        memory: &mut Memory,
-        batch: &RayBatch<'_>,
-        pending: &[u32],
-        answers: &mut [Q::Answer],
-    ) where
-        dyn Table: Traces<Q>,
-    {
-        if batch.decides() || batch.reports_surfaces() {
-            return self.careful_stream::<Q>(memory, batch, pending, answers);
-        }
-        self.with_stream(memory, |memory, prefetch| {
-            (self.engine.0).plain_stream(&self.tree, memory, batch, pending, answers, prefetch);
-        });
-    }
-
-    /// Answers the pending rays in a stream that decides about every hit and notes leaves.
-    pub(super) fn careful_stream<Q: StreamQuery<Item: Stored>>(
+    pub(super) fn stream<Q: Query<Item: Stored>>(
         &self,
         memory: &mut Memory,
         batch: &RayBatch<'_>,
@@ -221,37 +164,26 @@ impl Bvh {
     ) where
         dyn Table: Streams<Q>,
     {
-        self.with_stream(memory, |memory, prefetch| {
-            (self.engine.0).careful_stream(&self.tree, memory, batch, pending, answers, prefetch);
-        });
-    }
-
-    /// Runs `work` with memory of a stream, and whether it prefetches.
-    fn with_stream<T: Stored>(
-        &self,
-        memory: &mut Memory,
-        work: impl FnOnce((&mut [T], &mut [RaySetup]), bool),
-    ) {
         let mut setups = core::mem::take(&mut memory.setups);
         setups.resize(stream::SETUPS, RaySetup::IDLE);
-        let items = T::at_least(memory, stream::items(self.width().lanes(), self.depth()));
-        work((items, &mut setups), self.prefetches());
+        let items = Stored::at_least(memory, stream::items(self.width().lanes(), self.depth()));
+        let (room, prefetch) = ((items, &mut setups[..]), self.prefetches());
+        (self.engine.0).stream(&self.tree, room, batch, pending, answers, prefetch);
         memory.setups = setups;
     }
 
-    /// A plain query, ray by ray.
-    pub(crate) fn each<Q: PacketQuery<Item: Stored>>(
+    /// A query ray by ray.
+    fn each<Q: Query<Item: Stored>>(
         &self,
         memory: &mut Memory,
         batch: &RayBatch<'_>,
         answers: &mut [Q::Answer],
     ) where
-        dyn Table: Traces<Q>,
+        dyn Table: Each<Q>,
     {
-        let rays = batch.rays;
-        assert_eq!(rays.len(), answers.len(), "one answer per ray");
+        assert_eq!(batch.rays.len(), answers.len(), "one answer per ray");
         let stack = Stored::at_least(memory, stack_size(self.width().lanes(), self.depth()));
-        (self.engine.0).each(&self.tree, batch.shares(), stack, rays, answers);
+        (self.engine.0).each(&self.tree, stack, batch.rays, Some(batch), answers);
     }
 
     /// This tree as a ray of a batch looks at it.

@@ -185,15 +185,12 @@ impl<'a> RayQuery<'a> {
 
     /// The closest hit that counts; at equal distances the smallest (inst_id, geom_id, prim_id).
     ///
-    /// Costs as much as [`Bvh::intersect`] if the closest hit counts, and a visit of the hits on top if not.
+    /// Costs as much as [`Bvh::intersect`] and the decisions about hits on the way.
     #[must_use]
     pub fn intersect(self) -> Option<Hit> {
         let condition = self.condition();
         match self.scene {
-            Scene::Tree(bvh) => {
-                let moment = bvh.moment(self.time);
-                moment.closest_when(&self.ray, &condition, moment.intersect(&self.ray))
-            }
+            Scene::Tree(bvh) => bvh.moment(self.time).closest_when(&self.ray, &condition),
             Scene::Brute(_) => self.visit_hits(|_| Visit::Accept),
         }
     }

@@ -6,11 +6,10 @@ use antumbra_simd::scratch::{Bits, with_scratch};
 
 use super::bvh::Bvh;
 use crate::ray::{Hit, Ray};
-use crate::trace::engine::{Table, Traces};
+use crate::trace::engine::{Each, Table};
 use crate::trace::locate::locate;
 use crate::trace::memory::{Memory, Stored};
-use crate::trace::packet::PacketQuery;
-use crate::trace::query::{Closest, Occlusion};
+use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::ray_batch::{LocatedHit, RayBatch, Report};
 use crate::trace::stack::stack_size;
 use crate::trace::surface::{Surface, surface, unit};
@@ -149,19 +148,19 @@ impl Bvh {
         memory.hits = hits;
     }
 
-    /// Answers a ray, at its share of the span if there is one.
-    pub(super) fn one<Q: PacketQuery<Item: Stored + Bits>>(
+    /// A query of one ray, under the condition of its batch if it has one.
+    pub(super) fn one<Q: Query<Item: Stored + Bits>>(
         &self,
         ray: &Ray,
-        share: Option<&[f32]>,
+        batch: Option<&RayBatch<'_>>,
     ) -> Q::Answer
     where
-        dyn Table: Traces<Q>,
+        dyn Table: Each<Q>,
     {
         let mut answer = [Q::miss()];
         self.with_stack(|stack: &mut [Q::Item]| {
             let rays = core::slice::from_ref(ray);
-            (self.engine.0).each(&self.tree, share, stack, rays, &mut answer);
+            (self.engine.0).each(&self.tree, stack, rays, batch, &mut answer);
         });
         let [answer] = answer;
         answer

@@ -121,7 +121,7 @@ impl Batch<'_> {
             let len = open.rays.len();
             let batch = open.batch().under(self.conditions());
             let batch = batch.behind(&open.after);
-            bvh.careful_stream::<Nearest>(memory, &batch, &pending[..len], &mut lists[..len]);
+            bvh.stream::<Nearest>(memory, &batch, &pending[..len], &mut lists[..len]);
             open.retain(|index, place| {
                 let list = &lists[index];
                 let is_open = list.hits().iter().all(|hit| goes_on(place, hit));

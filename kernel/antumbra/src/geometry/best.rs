@@ -75,9 +75,9 @@ impl Best {
     /// Takes a hit in the object where the ray is now, or in the world, if it precedes the best so far and `counts`
     /// returns true. Returns whether it was taken. `counts` is called last, and only for hits that precede the best.
     #[inline(always)]
-    pub fn offer_if(&mut self, hit: Hit, counts: impl FnOnce() -> bool) -> bool {
+    pub fn offer_if(&mut self, hit: Hit, counts: impl FnOnce(&Hit) -> bool) -> bool {
         match self.preceded_by(hit) {
-            Some(hit) if counts() => {
+            Some(hit) if counts(&hit) => {
                 self.take(hit);
                 true
             }
@@ -88,7 +88,7 @@ impl Best {
     /// [`Best::offer_if`] for a hit that counts.
     #[inline(always)]
     pub fn offer(&mut self, hit: Hit) -> bool {
-        self.offer_if(hit, || true)
+        self.offer_if(hit, |_| true)
     }
 
     /// Limit for the best hit so far. As long as that hit is not nearer than the end of the instance interval, anything
@@ -141,6 +141,6 @@ mod tests {
         assert_eq!(best.found().map(|hit| hit.t), Some(1.0));
         best.exit();
         assert_eq!(best.limit, 1.0);
-        assert!(!best.offer_if(hit(0.5), || false), "it does not count");
+        assert!(!best.offer_if(hit(0.5), |_| false), "it does not count");
     }
 }

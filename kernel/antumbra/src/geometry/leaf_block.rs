@@ -105,20 +105,7 @@ pub(crate) trait LeafBlock: Clone + Send + Sync {
         lanes.find(|&lane| self.occludes(lane, ray, filters))
     }
 
-    /// Replaces `best` by the block's closest hit where that precedes it, and returns whether it did.
-    #[inline(always)]
-    fn intersect<S: Simd>(
-        &self,
-        simd: S,
-        ray: &RaySetup,
-        filters: &Filters,
-        best: &mut Best,
-    ) -> bool {
-        let lanes = self.candidates::<S, false>(simd, ray, best.limit);
-        self.improve(lanes, ray, filters, best)
-    }
-
-    /// [`LeafBlock::intersect`] for these lanes.
+    /// Replaces `best` by the closest hit in these lanes where that precedes it, and returns whether it did.
     fn improve(&self, lanes: LanesOf, ray: &RaySetup, filters: &Filters, best: &mut Best) -> bool;
 
     /// The corners of the triangle in a lane, if it is one.

@@ -6,15 +6,15 @@ use alloc::vec::Vec;
 
 use antumbra_simd::Scalar;
 
+use crate::geometry::QueryKind;
 use crate::geometry::best::Best;
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::masks::SceneMasks;
 use crate::geometry::primitives::Primitives;
 use crate::geometry::ray_setup::RaySetup;
-use crate::geometry::{PrimRef, QueryKind};
-use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
+use crate::trace::judge::named;
 use crate::trace::visit::Ranked;
 
 /// A scene without an acceleration structure, with the queries of [`Bvh`](crate::Bvh): every primitive is tested.
@@ -126,14 +126,8 @@ impl Brute {
         let occludes = |primitives: &Primitives, ray: &RaySetup, interval: Interval| {
             (0..primitives.len()).any(|index| {
                 if condition.accept.is_none() {
-                    let hit = primitives.occluder(index, ray).map(PrimRef::told);
-                    return hit.is_some_and(|PrimRef { geom_id, prim_id }| {
-                        condition.may_count(PrimId {
-                            inst_id: ray.inst_id,
-                            geom_id,
-                            prim_id,
-                        })
-                    });
+                    let hit = primitives.occluder(index, ray);
+                    return hit.is_some_and(|id| condition.may_count(named(id, ray)));
                 }
                 let hit = primitives.hit(index, ray, QueryKind::Occluded);
                 hit.is_some_and(|hit| {

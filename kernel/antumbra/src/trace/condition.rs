@@ -52,50 +52,23 @@ impl Conditions<'_> {
             }
     }
 
-    /// Whether all that counts is which primitive is hit.
-    #[inline(always)]
-    pub fn are_by_name(&self) -> bool {
-        self.filter.is_none()
-    }
-
-    /// Whether hits of the ray at this place on a primitive can count.
-    #[inline(always)]
-    pub fn may_count(&self, place: usize, id: PrimId) -> bool {
-        self.by_name(place).may_count(id)
-    }
-
-    /// Whether a hit of the ray at this place, on a primitive that may count, counts.
-    #[inline(always)]
-    pub fn accepts(&self, place: usize, hit: &Hit) -> bool {
-        self.filter.is_none_or(|filter| filter(place, hit))
-    }
-
-    /// Condition of the ray at this place, without the filter.
-    #[inline(always)]
-    fn by_name(&self, place: usize) -> Condition<'_> {
-        Condition {
-            excluded: self.except.map_or(PrimId::NONE, |except| except[place]),
-            mask: self.mask.map(|mask| match mask {
-                RayMasks::Same(mask) => mask,
-                RayMasks::Each(masks) => masks[place],
-            }),
-            masks: self.masks,
-            accept: None,
-            after: None,
-        }
-    }
-
     /// Runs `work` with the condition of the ray at this place.
     pub fn with<R>(&self, place: usize, work: impl FnOnce(&Condition<'_>) -> R) -> R {
         let filter = self
             .filter
             .map(|filter| move |hit: &Hit| filter(place, hit));
         work(&Condition {
+            excluded: self.except.map_or(PrimId::NONE, |except| except[place]),
+            mask: self.mask.map(|mask| match mask {
+                RayMasks::Same(mask) => mask,
+                RayMasks::Each(masks) => masks[place],
+            }),
+            masks: self.masks,
             accept: match &filter {
                 Some(filter) => Some(filter),
                 None => None,
             },
-            ..self.by_name(place)
+            after: None,
         })
     }
 }
@@ -123,12 +96,8 @@ impl<'a> Condition<'a> {
 
     /// Whether every hit counts.
     pub fn is_none(&self) -> bool {
-        self.excluded == PrimId::NONE && self.asks_nothing_else()
-    }
-
-    /// Whether all that counts is which primitive is hit.
-    pub fn asks_nothing_else(&self) -> bool {
-        self.accept.is_none()
+        self.excluded == PrimId::NONE
+            && self.accept.is_none()
             && match self.mask {
                 None => true,
                 Some(mask) => self.masks.is_none() && mask != 0,

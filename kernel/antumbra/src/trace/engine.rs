@@ -10,10 +10,8 @@ use antumbra_simd::{Dispatch, Isa, Scalar, Simd, Width as Lanes, WithSimd};
 
 use crate::error::Error;
 use crate::geometry::ray_setup::RaySetup;
-use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
-use crate::trace::conditional::Conditional;
 use crate::trace::instrumented::{Instrumented, Open};
 use crate::trace::memory::Memory;
 use crate::trace::nearest::{Search, Seeker};
@@ -21,7 +19,7 @@ use crate::trace::observe::Observer;
 use crate::trace::packet::group::{GroupQuery, Part};
 use crate::trace::packet::{PacketQuery, Packets};
 use crate::trace::pick::Pick;
-use crate::trace::query::{Closest, Occlusion, StreamQuery};
+use crate::trace::query::{Closest, Located, Occluder, Occlusion, Query};
 use crate::trace::ray_batch::RayBatch;
 use crate::trace::several::Nearest;
 use crate::trace::single::Single;
@@ -148,33 +146,21 @@ impl<const OWN: bool, const N: usize> WithSimd<N> for Make<OWN> {
     }
 }
 
-/// A kind of query in streams that decide about every hit, or note its leaf.
-pub(crate) trait Streams<Q: StreamQuery> {
-    /// Answers the `pending` rays of a batch, with memory of [`items`](crate::trace::stream::items) items and
-    /// [`SETUPS`](crate::trace::stream::SETUPS) rays.
-    fn careful_stream(
-        &self,
-        tree: &Tree,
-        memory: (&mut [Q::Item], &mut [RaySetup]),
-        batch: &RayBatch<'_>,
-        pending: &[u32],
-        answers: &mut [Q::Answer],
-        prefetch: bool,
-    );
-}
-
-/// A kind of query in all ways of tracing.
-pub(crate) trait Traces<Q: PacketQuery>: Streams<Q> {
-    /// Answers ray after ray, each at its share of the span if there are shares, with memory of a stack for the tree.
+/// A query of rays one after another.
+pub(crate) trait Each<Q: Query> {
+    /// Answers `rays`, under the conditions of their batch and at its times, with memory of a stack for the tree.
     fn each(
         &self,
         tree: &Tree,
-        shares: Option<&[f32]>,
         stack: &mut [Q::Item],
         rays: &[Ray],
+        batch: Option<&RayBatch<'_>>,
         answers: &mut [Q::Answer],
     );
+}
 
+/// A query of rays in packets.
+pub(crate) trait Packs<Q: PacketQuery> {
     /// Answers the rays of a batch that go in packets, and lists the others in `pending`.
     fn packets(
         &self,
@@ -184,12 +170,16 @@ pub(crate) trait Traces<Q: PacketQuery>: Streams<Q> {
         answers: &mut [Q::Answer],
         pending: &mut Vec<u32>,
     );
+}
 
-    /// [`Streams::careful_stream`] where every hit counts and no leaf is noted.
-    fn plain_stream(
+/// A query of rays in a stream.
+pub(crate) trait Streams<Q: Query> {
+    /// Answers the `pending` rays of a batch, with room for [`items`](crate::trace::stream::items) items and
+    /// [`SETUPS`](crate::trace::stream::SETUPS) rays.
+    fn stream(
         &self,
         tree: &Tree,
-        memory: (&mut [Q::Item], &mut [RaySetup]),
+        room: (&mut [Q::Item], &mut [RaySetup]),
         batch: &RayBatch<'_>,
         pending: &[u32],
         answers: &mut [Q::Answer],
@@ -199,7 +189,19 @@ pub(crate) trait Traces<Q: PacketQuery>: Streams<Q> {
 
 /// Everything that is compiled for a width and an instruction set. Trees are of that width.
 pub(crate) trait Table:
-    Traces<Occlusion> + Traces<Closest> + Streams<Nearest> + Sync
+    Each<Occlusion>
+    + Each<Occluder>
+    + Each<Closest>
+    + Each<Located<true>>
+    + Packs<Occlusion>
+    + Packs<Closest>
+    + Streams<Occlusion>
+    + Streams<Occluder>
+    + Streams<Closest>
+    + Streams<Located<false>>
+    + Streams<Located<true>>
+    + Streams<Nearest>
+    + Sync
 {
     fn isa(&self) -> Isa;
 
@@ -214,16 +216,6 @@ pub(crate) trait Table:
         rays: &[Ray],
         answers: &mut [bool],
     );
-
-    /// See [`Conditional`].
-    fn occluder_when(
-        &self,
-        tree: &Tree,
-        share: Option<f32>,
-        stack: &mut [u32],
-        ray: &Ray,
-        condition: &Condition<'_>,
-    ) -> Option<PrimId>;
 
     /// See [`Visiting`].
     fn visit(
@@ -250,78 +242,44 @@ impl<S: Simd + Lanes<N>, const N: usize> Compiled<S, N> {
     const HAS_VECTORS: bool = S::LANES > 0;
 }
 
-impl<S: Simd + Lanes<N>, Q: StreamQuery, const N: usize> Streams<Q> for Compiled<S, N> {
-    fn careful_stream(
-        &self,
-        tree: &Tree,
-        (items, setups): (&mut [Q::Item], &mut [RaySetup]),
-        batch: &RayBatch<'_>,
-        pending: &[u32],
-        answers: &mut [Q::Answer],
-        prefetch: bool,
-    ) {
-        if const { Self::HAS_VECTORS } {
-            let bvh = &tree.wide::<N>();
-            match batch.shares() {
-                None => self.0.run(Stream::<Q, _, N, true> {
-                    bvh,
-                    views: Still,
-                    items,
-                    setups,
-                    batch,
-                    pending,
-                    answers,
-                    prefetch,
-                }),
-                Some(shares) => self.0.run(Stream::<Q, _, N, true> {
-                    bvh,
-                    views: Shares(shares),
-                    items,
-                    setups,
-                    batch,
-                    pending,
-                    answers,
-                    prefetch,
-                }),
-            }
-        }
-    }
-}
+// Only queries with conditions look at times: the others have no code for them.
 
-impl<S: Simd + Lanes<N>, Q: PacketQuery, const N: usize> Traces<Q> for Compiled<S, N> {
+impl<S: Simd + Lanes<N>, Q: Query, const N: usize> Each<Q> for Compiled<S, N> {
     fn each(
         &self,
         tree: &Tree,
-        shares: Option<&[f32]>,
         stack: &mut [Q::Item],
         rays: &[Ray],
+        batch: Option<&RayBatch<'_>>,
         answers: &mut [Q::Answer],
     ) {
         let bvh = &tree.wide::<N>();
-        match shares {
-            None => {
-                let views = Still;
-                self.0.run(Single::<Q, _, N> {
-                    bvh,
-                    views,
-                    stack,
-                    rays,
-                    answers,
-                });
-            }
-            Some(shares) => {
-                let views = Shares(shares);
-                self.0.run(Single::<Q, _, N> {
-                    bvh,
-                    views,
-                    stack,
-                    rays,
-                    answers,
-                });
-            }
+        if const { Q::CONDITIONAL }
+            && let Some(shares) = batch.and_then(RayBatch::shares)
+        {
+            let views = Shares(shares);
+            return self.0.run(Single::<Q, _, N> {
+                bvh,
+                views,
+                batch,
+                stack,
+                rays,
+                answers,
+            });
         }
+        let views = Still;
+        self.0.run(Single::<Q, _, N> {
+            bvh,
+            views,
+            batch,
+            stack,
+            rays,
+            answers,
+        });
     }
+}
 
+impl<S: Simd + Lanes<N>, Q: PacketQuery, const N: usize> Packs<Q> for Compiled<S, N> {
     fn packets(
         &self,
         tree: &Tree,
@@ -341,8 +299,10 @@ impl<S: Simd + Lanes<N>, Q: PacketQuery, const N: usize> Traces<Q> for Compiled<
             });
         }
     }
+}
 
-    fn plain_stream(
+impl<S: Simd + Lanes<N>, Q: Query, const N: usize> Streams<Q> for Compiled<S, N> {
+    fn stream(
         &self,
         tree: &Tree,
         (items, setups): (&mut [Q::Item], &mut [RaySetup]),
@@ -351,31 +311,36 @@ impl<S: Simd + Lanes<N>, Q: PacketQuery, const N: usize> Traces<Q> for Compiled<
         answers: &mut [Q::Answer],
         prefetch: bool,
     ) {
-        if const { Self::HAS_VECTORS } {
-            let bvh = &tree.wide::<N>();
-            match batch.shares() {
-                None => self.0.run(Stream::<Q, _, N, false> {
-                    bvh,
-                    views: Still,
-                    items,
-                    setups,
-                    batch,
-                    pending,
-                    answers,
-                    prefetch,
-                }),
-                Some(shares) => self.0.run(Stream::<Q, _, N, false> {
-                    bvh,
-                    views: Shares(shares),
-                    items,
-                    setups,
-                    batch,
-                    pending,
-                    answers,
-                    prefetch,
-                }),
-            }
+        if const { !Self::HAS_VECTORS } {
+            return;
         }
+        let bvh = &tree.wide::<N>();
+        if const { Q::CONDITIONAL }
+            && let Some(shares) = batch.shares()
+        {
+            let views = Shares(shares);
+            return self.0.run(Stream::<Q, _, N> {
+                bvh,
+                views,
+                items,
+                setups,
+                batch,
+                pending,
+                answers,
+                prefetch,
+            });
+        }
+        let views = Still;
+        self.0.run(Stream::<Q, _, N> {
+            bvh,
+            views,
+            items,
+            setups,
+            batch,
+            pending,
+            answers,
+            prefetch,
+        });
     }
 }
 
@@ -405,18 +370,6 @@ impl<S: Simd + Lanes<N>, const N: usize> Table for Compiled<S, N> {
             rays,
             answers,
         });
-    }
-
-    fn occluder_when(
-        &self,
-        tree: &Tree,
-        share: Option<f32>,
-        stack: &mut [u32],
-        ray: &Ray,
-        condition: &Condition<'_>,
-    ) -> Option<PrimId> {
-        let bvh = &tree.wide::<N>();
-        on_view!(share, view => self.0.run(Conditional { bvh, view, stack, ray, condition }))
     }
 
     fn visit(

@@ -8,11 +8,13 @@ use alloc::vec::Vec;
 
 use antumbra_simd::{Mask, Simd, Width, WithSimd};
 
+use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::ray_setup::RaySetup;
 use crate::ray::Ray;
 use crate::trace::observe::{NodeVisit, Observer, Place};
 use crate::trace::pick::Pick;
-use crate::trace::step::{NodeLanes, NodeTest, leaf_occluder};
+use crate::trace::step::{NodeLanes, NodeTest};
+use crate::tree::leaves::on_leaf;
 use crate::tree::node::{Child, ChildKind};
 use crate::tree::wide::WideTree;
 
@@ -103,7 +105,7 @@ fn traverse<S: Simd + Width<N>, const N: usize>(
                 }
             }
             ChildKind::Leaf(leaf) => {
-                let found = leaf_occluder(simd, bvh, crate::trace::view::Still, leaf, ray);
+                let found = on_leaf!(bvh, leaf, block => block.occluded(simd, ray, &bvh.filters));
                 let index = bvh.leaf_index(leaf);
                 observer.leaf(index, bvh.leaf_len(leaf));
                 if let Some(lane) = found {

@@ -1,26 +1,30 @@
-//! The two queries, occlusion and closest hit: the decisions in which their traversals differ.
+//! The queries, occlusion and closest hit: the decisions in which their traversals differ.
+//!
+//! | query | finds | under the condition of the ray |
+//! |---|---|---|
+//! | [`Occlusion`] | whether anything is in the way | no |
+//! | [`Occluder`] | what is in the way | yes |
+//! | [`Closest`] | the closest hit | no |
+//! | [`Located`] | the closest hit and its leaf | no or yes |
+//! | [`Nearest`](crate::trace::several::Nearest) | the nearest hits | yes |
 
-use antumbra_simd::{Scalar, Simd};
+use antumbra_simd::Simd;
 
 use crate::geometry::best::Best;
 use crate::geometry::cutout::opacity::QueryKind;
-use crate::geometry::cutout::{CutoutBlock, CutoutHit, Filters};
+use crate::geometry::cutout::{CutoutHit, Filters};
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::leaf_block::LeafBlock;
-use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
-use crate::geometry::triangle::{LanesOf, VectorHits};
+use crate::geometry::triangle::LanesOf;
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
-use crate::trace::conditional::{improve_when, occluder_when};
+use crate::trace::judge;
 use crate::trace::pick::Children;
+use crate::trace::ray_batch::{LocatedHit, RayBatch};
 use crate::trace::stack::Stack;
-use crate::trace::step::{leaf_intersect, leaf_occluder, scalar_occluder};
-use crate::trace::view::View;
-use crate::tree::leaves::on_leaf;
-use crate::tree::node::Leaf;
-use crate::tree::wide::WideTree;
+use crate::tree::node::Child;
 
 /// The decisions of a traversal. Every ray has a state of its own that grows as the ray goes on.
 pub(crate) trait Query {
@@ -33,6 +37,13 @@ pub(crate) trait Query {
 
     /// The state of a ray that no query has begun for.
     const IDLE: Self::State;
+    /// Whether any hit will do, or the closest ones are sought.
+    const KIND: QueryKind;
+    /// Whether hits count by the condition of their ray. Otherwise all do.
+    const CONDITIONAL: bool;
+    /// Whether the lanes of leaves are judged; in a ray stream, when all leaves of a round are tested: many leaves hold no
+    /// candidate, and no CPU can guess which; nearly all others have one that is taken. Otherwise any lane found decides.
+    const JUDGES: bool = true;
 
     /// State with which a ray begins.
     #[inline(always)]
@@ -49,171 +60,59 @@ pub(crate) trait Query {
         Self::Answer::default()
     }
 
-    /// Boxes entered beyond this are of no interest.
+    /// Boxes entered and primitives hit beyond this are of no interest.
     #[inline(always)]
     fn limit(_: &Self::State, ray: &RaySetup) -> f32 {
         ray.tfar
     }
 
-    /// Tests a leaf that the ray has reached, and brings its state and stack up to date.
-    fn leaf<S: Simd, V: View, const N: usize>(
+    /// Takes what counts in these lanes of a block. Whether anything did. The condition only matters to
+    /// [conditional](Query::CONDITIONAL) queries.
+    #[inline(always)]
+    fn judge<B: LeafBlock>(
+        _: &mut Self::State,
+        _: &B,
+        lanes: LanesOf,
+        _: &RaySetup,
+        _: &Filters,
+        _: &Condition<'_>,
+    ) -> bool {
+        lanes.0 != 0
+    }
+
+    /// [`Query::judge`] for a hit on a cut-out, which was found before.
+    #[inline(always)]
+    fn settle(
+        state: &mut Self::State,
+        hit: &CutoutHit<'_>,
+        ray: &RaySetup,
+        filters: &Filters,
+        condition: &Condition<'_>,
+    ) -> bool {
+        let lanes = LanesOf(1 << hit.lane);
+        Self::judge(state, hit.block, lanes, ray, filters, condition)
+    }
+
+    /// Notes the leaf and drops from the stack what it has made needless, if it has `changed` what the ray goes on with.
+    fn prune<S: Simd>(
         state: &mut Self::State,
         stack: &mut Stack<'_, Self::Item>,
         simd: S,
-        bvh: &WideTree<N>,
-        view: V,
-        leaf: Leaf,
-        ray: &RaySetup,
+        leaf: Child,
+        changed: bool,
     );
 
-    /// Whether the ray goes into the instance of this number at all.
+    /// The ray goes into the instance of this number and place in the tree.
     #[inline(always)]
-    fn enters(_: &Self::State, _: u32) -> bool {
-        true
-    }
-
-    /// The ray goes into instance `index`.
-    #[inline(always)]
-    fn enter<const N: usize>(_: &mut Self::State, _: &WideTree<N>, _: usize, _: Interval) {}
+    fn enter(_: &mut Self::State, _inst_id: u32, _index: usize, _: Interval) {}
 
     /// The ray comes back into the world.
     #[inline(always)]
     fn exit(_: &mut Self::State) {}
-}
 
-/// The decisions of a ray stream, where leaves take several phases.
-pub(crate) trait StreamQuery: Query {
-    /// Whether lanes are left to be confirmed although nobody decides about hits.
-    const CONFIRMS: bool;
-
-    /// A leaf is reached in a ray stream. Has no branches that are hard to predict, even if it takes longer from end to end:
-    /// other rays fill the gaps, but a wrong guess throws their work away too. Returns the lanes, as bits, that are left to
-    /// be [confirmed](StreamQuery::confirm); if each hit is to be decided about (`decides`), these are all that may be hit.
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "all of them are in registers where the call is inlined"
-    )]
-    fn leaf_in_stream<S: Simd, V: View, const N: usize>(
-        state: &mut Self::State,
-        stack: &mut Stack<'_, Self::Item>,
-        simd: S,
-        bvh: &WideTree<N>,
-        view: V,
-        leaf: Leaf,
-        ray: &RaySetup,
-        decides: bool,
-    ) -> u32;
-
-    /// Decides about the lanes of a leaf that were left. Whether the ray goes on with a better hit.
+    /// Reports what a ray of a batch has found.
     #[inline(always)]
-    fn confirm<S: Simd, V: View, const N: usize>(
-        _: &mut Self::State,
-        _: &mut Stack<'_, Self::Item>,
-        _: S,
-        _: &WideTree<N>,
-        _: V,
-        _: (Leaf, u32),
-        _: &RaySetup,
-    ) -> bool {
-        false
-    }
-
-    /// [`StreamQuery::confirm`] for hits that have to fulfil a condition, without vectors: away from the loops. `ray`
-    /// comes with the instance interval. The second answer is the occluder.
-    fn confirm_when<const N: usize>(
-        state: &mut Self::State,
-        stack: &mut Stack<'_, Self::Item>,
-        bvh: (&WideTree<N>, impl View),
-        lanes: (Leaf, u32),
-        ray: (&RaySetup, Interval),
-        condition: &Condition<'_>,
-    ) -> (bool, Option<PrimId>);
-
-    /// A ray is occluded, if that answers the query.
-    #[inline(always)]
-    fn occlude(_: &mut Self::State, _: &mut Stack<'_, Self::Item>) {}
-
-    /// Tests a leaf of cut-outs. The hits are deferred.
-    fn cutout_hits<S: Simd>(
-        state: &Self::State,
-        simd: S,
-        block: &CutoutBlock,
-        ray: &RaySetup,
-    ) -> VectorHits<S>;
-
-    /// Decides about one of these hits. Whether the ray goes on with a better hit.
-    fn settle<S: Simd>(
-        state: &mut Self::State,
-        stack: &mut Stack<'_, Self::Item>,
-        simd: S,
-        hit: &CutoutHit<'_>,
-        ray: &RaySetup,
-        filters: &Filters,
-    ) -> bool;
-
-    /// The hit of a ray at its end, with ids as in the tree, if the query finds hits.
-    #[inline(always)]
-    fn hit(_: &Self::State) -> Option<Hit> {
-        None
-    }
-}
-
-/// The lanes of a leaf of any kind but triangles that may be hit, as bits. Away from the loops, which need their registers for
-/// triangles: 2 % of the instructions of occlusion in batches (AVX2).
-#[cold]
-#[inline(never)]
-fn other_lanes<const N: usize>(bvh: &WideTree<N>, leaf: Leaf, ray: &RaySetup, limit: f32) -> u32 {
-    on_leaf!(bvh, leaf, block => block.candidates::<Scalar, false>(Scalar, ray, limit).0)
-}
-
-/// The lanes of a leaf in a ray stream that may be hit no farther than `limit`, as bits.
-#[inline(always)]
-pub(super) fn lanes_in_stream<S: Simd, V: View, const N: usize>(
-    simd: S,
-    bvh: &WideTree<N>,
-    view: V,
-    leaf: Leaf,
-    ray: &RaySetup,
-    limit: f32,
-) -> u32 {
-    match leaf.kind {
-        PrimKind::Triangle => {
-            let block = view.triangles(simd, bvh, leaf.index);
-            block.candidates::<S, true>(simd, ray, limit).0
-        }
-        PrimKind::Curve => {
-            let block = &bvh.blocks.curves[leaf.index];
-            block.candidates::<S, true>(simd, ray, limit).0
-        }
-        _ => other_lanes(bvh, leaf, ray, limit),
-    }
-}
-
-/// [`other_lanes`] for occlusion; if nobody decides about hits, those that occlude the ray.
-#[cold]
-#[inline(never)]
-fn other_occluders<const N: usize>(
-    bvh: &WideTree<N>,
-    leaf: Leaf,
-    ray: &RaySetup,
-    decides: bool,
-) -> u32 {
-    if decides {
-        return other_lanes(bvh, leaf, ray, ray.tfar);
-    }
-    scalar_occluder(bvh, leaf, ray).map_or(0, |lane| 1 << lane)
-}
-
-/// Replaces `best` by the closest hit in these lanes of a leaf of any kind.
-#[cold]
-#[inline(never)]
-fn improve_other<const N: usize>(
-    bvh: &WideTree<N>,
-    (leaf, lanes): (Leaf, u32),
-    ray: &RaySetup,
-    best: &mut Best,
-) -> bool {
-    on_leaf!(bvh, leaf, block => block.improve(LanesOf(lanes), ray, &bvh.filters, best))
+    fn report(_: &Self::State, _: &RayBatch<'_>, _index: usize) {}
 }
 
 /// Query whether anything is in the way. Visits children by ascending slots and stops at the first occluder.
@@ -225,6 +124,9 @@ impl Query for Occlusion {
     type Answer = bool;
 
     const IDLE: bool = false;
+    const KIND: QueryKind = QueryKind::Occluded;
+    const CONDITIONAL: bool = false;
+    const JUDGES: bool = false;
 
     #[inline(always)]
     fn finish(occluded: &bool) -> bool {
@@ -232,102 +134,94 @@ impl Query for Occlusion {
     }
 
     #[inline(always)]
-    fn leaf<S: Simd, V: View, const N: usize>(
+    fn settle(
         occluded: &mut bool,
-        stack: &mut Stack<'_, u32>,
-        simd: S,
-        bvh: &WideTree<N>,
-        view: V,
-        leaf: Leaf,
-        ray: &RaySetup,
-    ) {
-        *occluded = leaf_occluder(simd, bvh, view, leaf, ray).is_some();
-        stack.clear_if(*occluded);
-    }
-}
-
-impl StreamQuery for Occlusion {
-    const CONFIRMS: bool = false;
-
-    #[inline(always)]
-    fn leaf_in_stream<S: Simd, V: View, const N: usize>(
-        occluded: &mut bool,
-        stack: &mut Stack<'_, u32>,
-        simd: S,
-        bvh: &WideTree<N>,
-        view: V,
-        leaf: Leaf,
-        ray: &RaySetup,
-        decides: bool,
-    ) -> u32 {
-        let lanes = match leaf.kind {
-            PrimKind::Triangle => view
-                .triangles(simd, bvh, leaf.index)
-                .occluders::<S, true>(simd, ray),
-            PrimKind::Curve => {
-                let block = &bvh.blocks.curves[leaf.index];
-                match decides {
-                    true => block.occluders::<S, true>(simd, ray),
-                    false => (block.occluded(simd, ray, &bvh.filters)).map_or(0, |lane| 1 << lane),
-                }
-            }
-            _ => other_occluders(bvh, leaf, ray, decides),
-        };
-        let is_left = decides && lanes != 0;
-        *occluded = !decides && lanes != 0;
-        stack.clear_if(*occluded);
-        if is_left { lanes } else { 0 }
-    }
-
-    fn confirm_when<const N: usize>(
-        occluded: &mut bool,
-        stack: &mut Stack<'_, u32>,
-        bvh: (&WideTree<N>, impl View),
-        lanes: (Leaf, u32),
-        (ray, interval): (&RaySetup, Interval),
-        condition: &Condition<'_>,
-    ) -> (bool, Option<PrimId>) {
-        // Another hit in the same leaf may have decided.
-        if *occluded {
-            return (false, None);
-        }
-        let occluder = occluder_when(bvh, lanes, ray, interval, condition);
-        *occluded = occluder.is_some();
-        stack.clear_if(*occluded);
-        (false, occluder)
-    }
-
-    #[inline(always)]
-    fn occlude(occluded: &mut bool, stack: &mut Stack<'_, u32>) {
-        *occluded = true;
-        stack.clear_if(true);
-    }
-
-    #[inline(always)]
-    fn cutout_hits<S: Simd>(
-        _: &bool,
-        simd: S,
-        block: &CutoutBlock,
-        ray: &RaySetup,
-    ) -> VectorHits<S> {
-        block.triangles.vector_occluders(simd, ray)
-    }
-
-    #[inline(always)]
-    fn settle<S: Simd>(
-        occluded: &mut bool,
-        stack: &mut Stack<'_, u32>,
-        _: S,
         hit: &CutoutHit<'_>,
         ray: &RaySetup,
         filters: &Filters,
+        _: &Condition<'_>,
     ) -> bool {
         // Another hit in the same leaf may have decided: then the filter is not called.
-        if !*occluded {
-            *occluded = hit.counts(QueryKind::Occluded, ray, filters);
-            stack.clear_if(*occluded);
+        *occluded || hit.counts(QueryKind::Occluded, ray, filters)
+    }
+
+    #[inline(always)]
+    fn prune<S: Simd>(
+        occluded: &mut bool,
+        stack: &mut Stack<'_, u32>,
+        _: S,
+        _: Child,
+        changed: bool,
+    ) {
+        *occluded = changed;
+        stack.clear_if(changed);
+    }
+}
+
+/// [`Occlusion`] under a condition, which finds the occluder. Which one depends on the tree.
+pub(crate) struct Occluder;
+
+/// Knowledge of a ray on its way.
+#[derive(Clone, Copy)]
+pub(crate) struct Blocked {
+    occluder: Option<PrimId>,
+    /// Where hits are reported: the instance interval.
+    interval: Interval,
+}
+
+impl Query for Occluder {
+    type Item = u32;
+    type State = Blocked;
+    type Answer = bool;
+
+    const IDLE: Blocked = Blocked {
+        occluder: None,
+        interval: Interval::WORLD,
+    };
+    const KIND: QueryKind = QueryKind::Occluded;
+    const CONDITIONAL: bool = true;
+
+    #[inline(always)]
+    fn finish(blocked: &Blocked) -> bool {
+        blocked.occluder.is_some()
+    }
+
+    #[inline(always)]
+    fn judge<B: LeafBlock>(
+        blocked: &mut Blocked,
+        block: &B,
+        lanes: LanesOf,
+        ray: &RaySetup,
+        filters: &Filters,
+        condition: &Condition<'_>,
+    ) -> bool {
+        // Another hit in the same leaf of cut-outs may have decided.
+        if blocked.occluder.is_none() {
+            let ray = (ray, blocked.interval);
+            blocked.occluder = judge::occluder(block, lanes, ray, filters, condition);
         }
-        false
+        blocked.occluder.is_some()
+    }
+
+    #[inline(always)]
+    fn prune<S: Simd>(_: &mut Blocked, stack: &mut Stack<'_, u32>, _: S, _: Child, occluded: bool) {
+        stack.clear_if(occluded);
+    }
+
+    #[inline(always)]
+    fn enter(blocked: &mut Blocked, _: u32, _: usize, interval: Interval) {
+        blocked.interval = interval;
+    }
+
+    #[inline(always)]
+    fn exit(blocked: &mut Blocked) {
+        blocked.interval = Interval::WORLD;
+    }
+
+    fn report(blocked: &Blocked, batch: &RayBatch<'_>, index: usize) {
+        if let Some(occluder) = blocked.occluder {
+            batch.report_occluder(index, occluder);
+        }
     }
 }
 
@@ -335,23 +229,14 @@ impl StreamQuery for Occlusion {
 /// found, so that pops need no thought.
 pub(crate) struct Closest;
 
-impl Closest {
-    /// Drops what begins behind the best hit.
-    #[inline(always)]
-    pub(super) fn cull<S: Simd>(best: &Best, stack: &mut Stack<'_, u64>, simd: S) {
-        // What is entered behind the origin lies on the stack as entered at 0. That is also where the exit
-        // from an instance lies.
-        let limit = if best.limit > 0.0 { best.limit } else { 0.0 };
-        stack.cull(simd, limit);
-    }
-}
-
 impl Query for Closest {
     type Item = u64;
     type State = Best;
     type Answer = Option<Hit>;
 
     const IDLE: Best = Best::none(0.0);
+    const KIND: QueryKind = QueryKind::Intersect;
+    const CONDITIONAL: bool = false;
 
     #[inline(always)]
     fn begin(ray: &Ray) -> Best {
@@ -368,26 +253,50 @@ impl Query for Closest {
         best.limit
     }
 
+    #[inline(always)]
+    fn judge<B: LeafBlock>(
+        best: &mut Best,
+        block: &B,
+        lanes: LanesOf,
+        ray: &RaySetup,
+        filters: &Filters,
+        _: &Condition<'_>,
+    ) -> bool {
+        block.improve(lanes, ray, filters, best)
+    }
+
+    #[inline(always)]
+    fn settle(
+        best: &mut Best,
+        hit: &CutoutHit<'_>,
+        ray: &RaySetup,
+        filters: &Filters,
+        _: &Condition<'_>,
+    ) -> bool {
+        hit.improves(best, ray, filters)
+    }
+
     /// Children entered at the distance of the best hit are kept: they may hold an equally near primitive of
     /// a smaller id.
     #[inline(always)]
-    fn leaf<S: Simd, V: View, const N: usize>(
+    fn prune<S: Simd>(
         best: &mut Best,
         stack: &mut Stack<'_, u64>,
         simd: S,
-        bvh: &WideTree<N>,
-        view: V,
-        leaf: Leaf,
-        ray: &RaySetup,
+        _: Child,
+        better: bool,
     ) {
-        if leaf_intersect(simd, bvh, view, leaf, ray, best) {
-            Self::cull(best, stack, simd);
+        if better {
+            // What is entered behind the origin lies on the stack as entered at 0. That is also where the exit
+            // from an instance lies.
+            let limit = if best.limit > 0.0 { best.limit } else { 0.0 };
+            stack.cull(simd, limit);
         }
     }
 
     #[inline(always)]
-    fn enter<const N: usize>(best: &mut Best, bvh: &WideTree<N>, index: usize, interval: Interval) {
-        best.enter(interval, bvh.instances[index].placement.inst_id);
+    fn enter(best: &mut Best, inst_id: u32, _: usize, interval: Interval) {
+        best.enter(interval, inst_id);
     }
 
     #[inline(always)]
@@ -396,93 +305,117 @@ impl Query for Closest {
     }
 }
 
-impl StreamQuery for Closest {
-    const CONFIRMS: bool = true;
+/// [`Closest`] with the leaf of the hit, under a condition if it is `CONDITIONAL`.
+pub(crate) struct Located<const CONDITIONAL: bool>;
 
-    /// Many leaves of triangles hold no candidate, and no CPU can guess which. So the others are left for
-    /// later, when nearly all have one candidate and improve the best hit.
-    #[inline(always)]
-    fn leaf_in_stream<S: Simd, V: View, const N: usize>(
-        best: &mut Best,
-        _: &mut Stack<'_, u64>,
-        simd: S,
-        bvh: &WideTree<N>,
-        view: V,
-        leaf: Leaf,
-        ray: &RaySetup,
-        _: bool,
-    ) -> u32 {
-        lanes_in_stream(simd, bvh, view, leaf, ray, best.limit)
-    }
+/// Knowledge of a ray on its way.
+#[derive(Clone, Copy)]
+pub(crate) struct Found {
+    best: Best,
+    /// Leaf of the best hit, and index of its instance.
+    leaf: Child,
+    instance: u32,
+    /// Index of the instance where the ray is, or [`LocatedHit::WORLD`].
+    here: u32,
+}
+
+impl<const CONDITIONAL: bool> Query for Located<CONDITIONAL> {
+    type Item = u64;
+    type State = Found;
+    type Answer = Option<Hit>;
+
+    const IDLE: Found = Found {
+        best: Closest::IDLE,
+        leaf: Child::EMPTY,
+        instance: LocatedHit::WORLD,
+        here: LocatedHit::WORLD,
+    };
+    const KIND: QueryKind = QueryKind::Intersect;
+    const CONDITIONAL: bool = CONDITIONAL;
 
     #[inline(always)]
-    fn confirm<S: Simd, V: View, const N: usize>(
-        best: &mut Best,
-        stack: &mut Stack<'_, u64>,
-        simd: S,
-        bvh: &WideTree<N>,
-        view: V,
-        (leaf, lanes): (Leaf, u32),
-        ray: &RaySetup,
-    ) -> bool {
-        let improved = match leaf.kind {
-            PrimKind::Triangle => view.triangles(simd, bvh, leaf.index).improve(
-                LanesOf(lanes),
-                ray,
-                &bvh.filters,
-                best,
-            ),
-            _ => improve_other(bvh, (leaf, lanes), ray, best),
-        };
-        if improved {
-            Self::cull(best, stack, simd);
+    fn begin(ray: &Ray) -> Found {
+        Found {
+            best: Closest::begin(ray),
+            ..Self::IDLE
         }
-        improved
     }
 
-    fn confirm_when<const N: usize>(
-        best: &mut Best,
-        stack: &mut Stack<'_, u64>,
-        bvh: (&WideTree<N>, impl View),
-        lanes: (Leaf, u32),
-        (ray, _): (&RaySetup, Interval),
+    #[inline(always)]
+    fn finish(found: &Found) -> Option<Hit> {
+        Closest::finish(&found.best)
+    }
+
+    #[inline(always)]
+    fn limit(found: &Found, ray: &RaySetup) -> f32 {
+        Closest::limit(&found.best, ray)
+    }
+
+    #[inline(always)]
+    fn judge<B: LeafBlock>(
+        found: &mut Found,
+        block: &B,
+        lanes: LanesOf,
+        ray: &RaySetup,
+        filters: &Filters,
         condition: &Condition<'_>,
-    ) -> (bool, Option<PrimId>) {
-        let improved = improve_when(bvh, lanes, ray, best, condition);
-        if improved {
-            Self::cull(best, stack, Scalar);
+    ) -> bool {
+        match CONDITIONAL {
+            true => judge::offer(block, lanes, ray, filters, condition, &mut found.best),
+            false => block.improve(lanes, ray, filters, &mut found.best),
         }
-        (improved, None)
     }
 
     #[inline(always)]
-    fn hit(best: &Best) -> Option<Hit> {
-        best.hit()
-    }
-
-    #[inline(always)]
-    fn cutout_hits<S: Simd>(
-        best: &Best,
-        simd: S,
-        block: &CutoutBlock,
-        ray: &RaySetup,
-    ) -> VectorHits<S> {
-        block.triangles.vector_hits(simd, ray, best.limit)
-    }
-
-    #[inline(always)]
-    fn settle<S: Simd>(
-        best: &mut Best,
-        stack: &mut Stack<'_, u64>,
-        simd: S,
+    fn settle(
+        found: &mut Found,
         hit: &CutoutHit<'_>,
         ray: &RaySetup,
         filters: &Filters,
+        condition: &Condition<'_>,
     ) -> bool {
-        let improved = hit.improves(best, ray, filters);
-        if improved {
-            Self::cull(best, stack, simd);
+        let lanes = LanesOf(1 << hit.lane);
+        match CONDITIONAL {
+            true => Self::judge(found, hit.block, lanes, ray, filters, condition),
+            false => hit.improves(&mut found.best, ray, filters),
         }
-        improved
+    }
+
+    #[inline(always)]
+    fn prune<S: Simd>(
+        found: &mut Found,
+        stack: &mut Stack<'_, u64>,
+        simd: S,
+        leaf: Child,
+        better: bool,
+    ) {
+        if better {
+            (found.leaf, found.instance) = (leaf, found.here);
+        }
+        Closest::prune(&mut found.best, stack, simd, leaf, better);
+    }
+
+    #[inline(always)]
+    fn enter(found: &mut Found, inst_id: u32, index: usize, interval: Interval) {
+        found.best.enter(interval, inst_id);
+        found.here = index as u32;
+    }
+
+    #[inline(always)]
+    fn exit(found: &mut Found) {
+        found.best.exit();
+        found.here = LocatedHit::WORLD;
+    }
+
+    fn report(found: &Found, batch: &RayBatch<'_>, index: usize) {
+        if let Some(hit) = found.best.hit() {
+            let &Found { leaf, instance, .. } = found;
+            let found = LocatedHit {
+                hit,
+                leaf,
+                instance,
+            };
+            batch.report_surface(index, &found);
+        }
     }
 }

@@ -17,6 +17,8 @@ pub(crate) struct RayBatch<'a> {
     /// Index of the first ray in the list that the batch began with.
     start: usize,
     conditions: Option<&'a Conditions<'a>>,
+    /// Condition of every ray, if there are no `conditions`.
+    condition: &'a Condition<'a>,
     /// A hit for each ray in that list, with ids as in the tree. Only hits behind it count.
     after: Option<&'a [Hit]>,
     report: Report<'a>,
@@ -68,6 +70,7 @@ impl<'a> RayBatch<'a> {
             places: Places::From(first),
             start: 0,
             conditions: None,
+            condition: &Condition::NONE,
             after: None,
             report: Report::Nothing,
             is_alike: false,
@@ -86,6 +89,11 @@ impl<'a> RayBatch<'a> {
     /// Only hits that fulfil the conditions count.
     pub fn under(self, conditions: Option<&'a Conditions<'a>>) -> Self {
         Self { conditions, ..self }
+    }
+
+    /// Only hits that fulfil this condition count.
+    pub fn when(self, condition: &'a Condition<'a>) -> Self {
+        Self { condition, ..self }
     }
 
     /// Only hits behind these count, one for each ray.
@@ -148,36 +156,13 @@ impl<'a> RayBatch<'a> {
         self.is_alike
     }
 
-    /// Whether traversals have to decide about every hit.
+    /// Whether hits count by the conditions of their rays, or occluders are reported, or rays look at times.
     #[inline(always)]
-    pub fn decides(&self) -> bool {
+    pub fn is_conditional(&self) -> bool {
         self.conditions.is_some()
             || self.after.is_some()
+            || self.shares.is_some()
             || matches!(self.report, Report::Occluder(_))
-    }
-
-    /// Whether all that counts is which primitive is hit: [`RayBatch::may_count`] decides.
-    #[inline(always)]
-    pub fn decides_by_name(&self) -> bool {
-        self.conditions.is_none_or(Conditions::are_by_name)
-    }
-
-    /// Whether hits of a ray on a primitive can count.
-    #[inline(always)]
-    pub fn may_count(&self, index: usize, id: PrimId) -> bool {
-        match self.conditions {
-            None => true,
-            Some(conditions) => conditions.may_count(self.place(index), id),
-        }
-    }
-
-    /// Whether a hit of a ray, on a primitive that may count, counts.
-    #[inline(always)]
-    pub fn accepts(&self, index: usize, hit: &Hit) -> bool {
-        match self.conditions {
-            None => true,
-            Some(conditions) => conditions.accepts(self.place(index), hit),
-        }
     }
 
     /// Whether traversals have to note the leaves of hits.
@@ -198,7 +183,7 @@ impl<'a> RayBatch<'a> {
             }),
             None => work(&Condition {
                 after,
-                ..Condition::NONE
+                ..*self.condition
             }),
         }
     }

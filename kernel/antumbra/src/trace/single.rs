@@ -5,10 +5,12 @@ use antumbra_simd::{Simd, Width, WithSimd, fresh};
 use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::RaySetup;
 use crate::ray::Ray;
+use crate::trace::judge::Owner;
 use crate::trace::pick::Children;
 use crate::trace::query::Query;
+use crate::trace::ray_batch::RayBatch;
 use crate::trace::stack::{Item, Stack};
-use crate::trace::step::NodeTest;
+use crate::trace::step::{NodeTest, leaf_step};
 use crate::trace::view::{View, Views};
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::WideTree;
@@ -17,6 +19,8 @@ use crate::tree::wide::WideTree;
 pub(crate) struct Single<'a, Q: Query, V, const N: usize> {
     pub bvh: &'a WideTree<'a, N>,
     pub views: V,
+    /// The rays with their conditions, for [conditional](Query::CONDITIONAL) queries.
+    pub batch: Option<&'a RayBatch<'a>>,
     /// Memory of a stack for this tree.
     pub stack: &'a mut [Q::Item],
     pub rays: &'a [Ray],
@@ -36,8 +40,14 @@ impl<Q: Query, V: Views, const N: usize> WithSimd<N> for Single<'_, Q, V, N> {
             *answer = if setup.set(simd, ray, self.bvh.reach) {
                 let stack = Stack::new(self.stack, 0);
                 let setups = (&setup, &mut object_setup);
-                let view = self.views.of(index);
-                traverse::<S, N, Q, _>(simd, self.bvh, view, setups, stack, Q::begin(ray))
+                let batch = self.batch.filter(|_| Q::CONDITIONAL);
+                let (seen, owner) = ((self.bvh, self.views.of(index)), Owner { batch, index });
+                let state = Q::begin(ray);
+                let state = traverse::<S, Q, _, N>(simd, seen, setups, stack, state, owner);
+                if let Some(batch) = batch {
+                    Q::report(&state, batch, index);
+                }
+                Q::finish(&state)
             } else {
                 Q::miss()
             };
@@ -48,14 +58,14 @@ impl<Q: Query, V: Views, const N: usize> WithSimd<N> for Single<'_, Q, V, N> {
 /// Visits the nodes and leaves that the query wants, until it is done or nothing is left. The ray is given as
 /// made ready for the world, and memory for it as made ready for the object of an instance.
 #[inline(always)]
-pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query, V: View>(
+fn traverse<S: Simd + Width<N>, Q: Query, V: View, const N: usize>(
     simd: S,
-    bvh: &WideTree<N>,
-    view: V,
+    (bvh, view): (&WideTree<N>, V),
     (world, object): (&RaySetup, &mut Option<RaySetup>),
     mut stack: Stack<'_, Q::Item>,
     mut state: Q::State,
-) -> Q::Answer {
+    owner: Owner<'_>,
+) -> Q::State {
     let mut ray = world;
     let mut next = Child::ROOT;
     // Once for every tree that the ray comes to, and for the world again and again between them.
@@ -76,10 +86,12 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query, V: View>(
                     next
                 }
                 ChildKind::Leaf(leaf) => {
-                    Q::leaf(&mut state, &mut stack, simd, bvh, view, leaf, ray);
+                    let seen = (bvh, view);
+                    let changed = leaf_step::<S, Q, V, N>(&mut state, simd, seen, leaf, ray, owner);
+                    Q::prune(&mut state, &mut stack, simd, next, changed);
                     stack.pop().child()
                 }
-                ChildKind::Instance(_) if next == Child::DONE => return Q::finish(&state),
+                ChildKind::Instance(_) if next == Child::DONE => return state,
                 ChildKind::Instance(index) => break index,
             };
         };
@@ -92,13 +104,15 @@ pub(super) fn traverse<S: Simd + Width<N>, const N: usize, Q: Query, V: View>(
         }
         let placed = &bvh.instances[passage];
         let object = object.get_or_insert(RaySetup::IDLE);
-        let entered = match Q::enters(&state, placed.placement.inst_id) {
+        let inst_id = placed.placement.inst_id;
+        let enters = !Q::CONDITIONAL || owner.enters(inst_id);
+        let entered = match enters {
             true => view.place(simd, bvh, passage, world, object),
             false => None,
         };
         next = match entered {
             Some(interval) => {
-                Q::enter(&mut state, bvh, passage, interval);
+                Q::enter(&mut state, inst_id, passage, interval);
                 stack.push(Q::Item::unordered(Child::EXIT));
                 ray = &*object;
                 Child(placed.root)

@@ -2,11 +2,16 @@
 
 use antumbra_simd::{Lanes, Scalar, Simd, Width};
 
-use crate::geometry::best::Best;
+use crate::geometry::QueryKind;
+use crate::geometry::cutout::Filters;
 use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::primitives::PrimKind;
 use crate::geometry::ray_setup::{RaySetup, Side};
 use crate::geometry::slab_test::NodeSlabs;
+use crate::geometry::triangle::LanesOf;
+use crate::trace::condition::Condition;
+use crate::trace::judge::Owner;
+use crate::trace::query::Query;
 use crate::trace::view::{View, on_seen_leaf};
 use crate::tree::leaves::on_leaf;
 use crate::tree::node::Leaf;
@@ -66,48 +71,131 @@ impl<S: Simd + Width<N>, const N: usize> NodeTest<S, N> {
     }
 }
 
-/// Tests the primitives of a leaf: the first lane found that occludes the ray.
+/// The leaf step: finds the lanes of a leaf that may count, and judges them. Whether the state has changed.
 #[inline(always)]
-pub(crate) fn leaf_occluder<S: Simd, V: View, const N: usize>(
+pub(crate) fn leaf_step<S: Simd, Q: Query, V: View, const N: usize>(
+    state: &mut Q::State,
     simd: S,
-    bvh: &WideTree<N>,
-    view: V,
+    seen: (&WideTree<N>, V),
     leaf: Leaf,
     ray: &RaySetup,
-) -> Option<usize> {
-    let Leaf { kind, index } = leaf;
-    match kind {
-        PrimKind::Triangle => {
-            view.triangles(simd, bvh, index)
-                .occluded::<S>(simd, ray, &bvh.filters)
+    owner: Owner<'_>,
+) -> bool {
+    let lanes = leaf_lanes::<S, Q, V, N, false>(state, simd, seen, leaf, ray);
+    lanes != 0
+        && (!Q::JUDGES || judge_lanes::<S, Q, V, N>(state, simd, seen, (leaf, lanes), ray, owner))
+}
+
+/// The lanes of a block that may count, as bits; or, if the query does not [judge](Query::JUDGES), one that does if any do.
+#[inline(always)]
+fn lanes<S: Simd, Q: Query, B: LeafBlock, const STREAM: bool>(
+    state: &Q::State,
+    simd: S,
+    block: &B,
+    ray: &RaySetup,
+    filters: &Filters,
+) -> u32 {
+    if Q::KIND == QueryKind::Intersect {
+        return (block.candidates::<S, STREAM>(simd, ray, Q::limit(state, ray))).0;
+    }
+    let lanes = block.occluders::<S, STREAM>(simd, ray);
+    match Q::JUDGES || B::OCCLUDERS_ARE_SURE {
+        true => lanes,
+        false => {
+            let first = block.first_occluder(LanesOf(lanes), ray, filters);
+            first.map_or(0, |lane| 1 << lane)
         }
-        PrimKind::Cutout => bvh.blocks.cutouts[index].occluded::<S>(simd, ray, &bvh.filters),
-        PrimKind::Curve => bvh.blocks.curves[index].occluded::<S>(simd, ray, &bvh.filters),
-        _ => scalar_occluder(bvh, leaf, ray),
     }
 }
 
-/// [`leaf_occluder`] without vectors. Away from the loops, which need their registers for triangles: 2 % of the
-/// instructions of occlusion in batches (AVX2).
-#[cold]
-#[inline(never)]
-pub(crate) fn scalar_occluder<const N: usize>(
-    bvh: &WideTree<N>,
+/// The first half of the leaf step: the lanes of a leaf that may count, as bits. In a ray stream (`STREAM`) without branches that
+/// are hard to predict, even if it takes longer from end to end: other rays fill the gaps, but a wrong guess throws their work
+/// away too. Leaves of cut-outs do not come here then.
+#[inline(always)]
+pub(crate) fn leaf_lanes<S: Simd, Q: Query, V: View, const N: usize, const STREAM: bool>(
+    state: &Q::State,
+    simd: S,
+    (bvh, view): (&WideTree<N>, V),
     leaf: Leaf,
     ray: &RaySetup,
-) -> Option<usize> {
-    on_leaf!(bvh, leaf, block => block.occluded::<Scalar>(Scalar, ray, &bvh.filters))
+) -> u32 {
+    match leaf.kind {
+        PrimKind::Triangle => {
+            let block = view.triangles(simd, bvh, leaf.index);
+            lanes::<S, Q, _, STREAM>(state, simd, &*block, ray, &bvh.filters)
+        }
+        PrimKind::Cutout if !STREAM => {
+            let block = &bvh.blocks.cutouts[leaf.index];
+            lanes::<S, Q, _, STREAM>(state, simd, block, ray, &bvh.filters)
+        }
+        PrimKind::Curve => {
+            let block = &bvh.blocks.curves[leaf.index];
+            lanes::<S, Q, _, STREAM>(state, simd, block, ray, &bvh.filters)
+        }
+        _ => other_lanes::<Q, N>(state, bvh, leaf, ray),
+    }
 }
 
-/// Replaces `best` by the leaf's closest hit where that precedes it, and returns whether it did.
-#[inline(always)]
-pub(crate) fn leaf_intersect<S: Simd, V: View, const N: usize>(
-    simd: S,
+/// [`leaf_lanes`] without vectors. Away from the loops, which need their registers for triangles: 2 % of the instructions of
+/// occlusion in batches (AVX2).
+#[cold]
+#[inline(never)]
+fn other_lanes<Q: Query, const N: usize>(
+    state: &Q::State,
     bvh: &WideTree<N>,
-    view: V,
     leaf: Leaf,
     ray: &RaySetup,
-    best: &mut Best,
+) -> u32 {
+    on_leaf!(bvh, leaf, block => lanes::<Scalar, Q, _, false>(state, Scalar, block, ray, &bvh.filters))
+}
+
+/// The second half: judges these lanes. Whether the state has changed.
+#[inline(always)]
+pub(crate) fn judge_lanes<S: Simd, Q: Query, V: View, const N: usize>(
+    state: &mut Q::State,
+    simd: S,
+    (bvh, view): (&WideTree<N>, V),
+    (leaf, lanes): (Leaf, u32),
+    ray: &RaySetup,
+    owner: Owner<'_>,
 ) -> bool {
-    on_seen_leaf!(simd, bvh, view, leaf, block => block.intersect(simd, ray, &bvh.filters, best))
+    match (Q::CONDITIONAL, leaf.kind) {
+        (true, _) => judge_lanes_when::<Q, V, N>(state, (bvh, view), (leaf, lanes), ray, owner),
+        (false, PrimKind::Triangle) => {
+            let block = view.triangles(simd, bvh, leaf.index);
+            let (lanes, condition) = (LanesOf(lanes), &Condition::NONE);
+            Q::judge(state, &*block, lanes, ray, &bvh.filters, condition)
+        }
+        (false, _) => judge_others::<Q, N>(state, bvh, (leaf, lanes), ray),
+    }
+}
+
+/// [`judge_lanes`] for any kind but triangles.
+#[cold]
+#[inline(never)]
+fn judge_others<Q: Query, const N: usize>(
+    state: &mut Q::State,
+    bvh: &WideTree<N>,
+    (leaf, lanes): (Leaf, u32),
+    ray: &RaySetup,
+) -> bool {
+    on_leaf!(bvh, leaf, block => {
+        Q::judge(state, block, LanesOf(lanes), ray, &bvh.filters, &Condition::NONE)
+    })
+}
+
+/// [`judge_lanes`] by the condition of the ray.
+#[inline(never)]
+fn judge_lanes_when<Q: Query, V: View, const N: usize>(
+    state: &mut Q::State,
+    (bvh, view): (&WideTree<N>, V),
+    (leaf, lanes): (Leaf, u32),
+    ray: &RaySetup,
+    owner: Owner<'_>,
+) -> bool {
+    owner.with(|condition| {
+        on_seen_leaf!(Scalar, bvh, view, leaf, block => {
+            Q::judge(state, block, LanesOf(lanes), ray, &bvh.filters, condition)
+        })
+    })
 }

@@ -13,9 +13,9 @@
 //! | `visit_nodes` | at nodes | one node step |
 //! | `collect_cutouts` | at leaves of cut-outs | defers the hits, see [`crate::trace::deferred`] |
 //! | `enter_instances` | at instances | makes the ray ready for the object and visits its root |
-//! | `test_leaves` | at other leaves | one leaf step |
-//! | `confirm_hits` | at leaves with candidates | computes the distances of closest hits |
-//! | `settle_cutouts` | with deferred hits | decides whether they count |
+//! | `test_leaves` | at other leaves | finds the lanes that may be hit; occlusion without a condition is decided by that |
+//! | `judge_leaves` | with such lanes, but for that | judges them, see [`crate::trace::judge`] |
+//! | `settle_cutouts` | with deferred hits | judges these |
 //!
 //! A pop comes a whole round after the push it may depend on, when that has long been written. Instances and micromaps
 //! are prefetched a phase or more before they are needed.
@@ -27,21 +27,17 @@
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use crate::geometry::QueryKind;
-use crate::geometry::cutout::{CutoutBlock, Filters};
-use crate::geometry::instance_ray::Interval;
-use crate::geometry::leaf_block::LeafBlock;
-use crate::geometry::primitives::PrimKind;
+use crate::geometry::cutout::{CutoutBlock, CutoutHit, Filters};
 use crate::geometry::ray_setup::RaySetup;
-use crate::geometry::triangle::{LanesOf, TriangleBlock};
 use crate::trace::condition::Condition;
-use crate::trace::conditional::{named, reported};
 use crate::trace::deferred::Deferred;
+use crate::trace::judge::Owner;
 use crate::trace::leaf_places::LeafPlaces;
 use crate::trace::pick::Children;
-use crate::trace::query::StreamQuery;
-use crate::trace::ray_batch::{LocatedHit, RayBatch};
+use crate::trace::query::Query;
+use crate::trace::ray_batch::RayBatch;
 use crate::trace::stack::{Item, Stack, stack_size};
-use crate::trace::step::NodeTest;
+use crate::trace::step::{NodeTest, judge_lanes, leaf_lanes};
 use crate::trace::view::{View, Views};
 use crate::tree::node::{Child, ChildKind, Leaf};
 use crate::tree::wide::WideTree;
@@ -97,8 +93,8 @@ fn block<'a, const N: usize>(
     &bvh.blocks.cutouts[Child(next[id]).index()]
 }
 
-/// Answers rays in a stream; `answers` is as long. A `CAREFUL` stream decides about every hit, or notes the leaves of hits.
-pub(crate) struct Stream<'a, Q: StreamQuery, V, const N: usize, const CAREFUL: bool> {
+/// Answers rays in a stream; `answers` is as long.
+pub(crate) struct Stream<'a, Q: Query, V, const N: usize> {
     pub bvh: &'a WideTree<'a, N>,
     pub views: V,
     /// Memory of [`items`] items.
@@ -127,9 +123,7 @@ fn stride(size: usize) -> usize {
     16 * (size.div_ceil(16) | 1)
 }
 
-impl<Q: StreamQuery, V: Views, const N: usize, const CAREFUL: bool> WithSimd<N>
-    for Stream<'_, Q, V, N, CAREFUL>
-{
+impl<Q: Query, V: Views, const N: usize> WithSimd<N> for Stream<'_, Q, V, N> {
     type Output = ();
 
     #[inline(always)]
@@ -139,15 +133,13 @@ impl<Q: StreamQuery, V: Views, const N: usize, const CAREFUL: bool> WithSimd<N>
         let ([setups, worlds], _) = self.setups.as_chunks_mut::<SLOTS>() else {
             unreachable!("memory for two rays in each slot");
         };
-        let mut flight = Flight::<S, Q, V, N, CAREFUL> {
+        let mut flight = Flight::<S, Q, V, N> {
             simd,
             bvh: self.bvh,
             views: self.views,
             leaf_places: &LeafPlaces::new(self.bvh),
             prefetch: self.prefetch,
             batch: self.batch,
-            decides: CAREFUL && self.batch.decides(),
-            by_name: CAREFUL && self.batch.decides_by_name(),
             pending: self.pending.iter(),
             answers: self.answers,
             items: self.items,
@@ -159,8 +151,6 @@ impl<Q: StreamQuery, V: Views, const N: usize, const CAREFUL: bool> WithSimd<N>
             tops: &mut [0; SLOTS],
             next: &mut [Child::DONE.0; SLOTS],
             lanes: &mut [0; SLOTS],
-            spaces: &mut [Space::WORLD; SLOTS],
-            leaves: &mut [(Child::EMPTY, LocatedHit::WORLD); SLOTS],
             deferred: &mut Deferred::new(if has_cutouts { SLOTS } else { 0 }),
             live: Slots::first(self.pending.len()),
         };
@@ -178,13 +168,9 @@ impl<Q: StreamQuery, V: Views, const N: usize, const CAREFUL: bool> WithSimd<N>
                 flight.collect_cutouts(at.cutouts);
             }
             flight.enter_instances(at.entries);
-            let undecided = flight.test_leaves(at.leaves);
-            if CAREFUL && flight.decides {
-                for id in undecided {
-                    flight.confirm_leaf(id);
-                }
-            } else if Q::CONFIRMS {
-                flight.confirm_hits(undecided);
+            let waiting = flight.test_leaves(at.leaves);
+            if Q::JUDGES {
+                flight.judge_leaves(waiting);
             }
             flight.settle_cutouts();
         }
@@ -205,87 +191,29 @@ struct Arrivals {
     done: Slots,
 }
 
-/// The instance where a ray is, or the world.
-#[derive(Clone, Copy)]
-struct Space {
-    interval: Interval,
-    /// Index of the instance, or [`LocatedHit::WORLD`].
-    instance: u32,
-}
-
-impl Space {
-    const WORLD: Self = Self {
-        interval: Interval::WORLD,
-        instance: LocatedHit::WORLD,
-    };
-}
-
-/// Decides which lanes of a leaf fulfil the condition of their ray. Returns whether the ray goes on with a better hit.
+/// Settles a deferred hit by the condition of its ray. Whether the state has changed.
 ///
 /// No method: the compiler keeps nothing of a stream in registers whose reference goes to a function that is not inlined.
 #[inline(never)]
-fn confirm_when<Q: StreamQuery, V: View, const N: usize>(
-    (bvh, view): (&WideTree<N>, V),
-    (batch, index): (&RayBatch<'_>, usize),
-    (child, lanes): (Child, u32),
-    ray: (&RaySetup, Interval),
-    (state, stack): (&mut Q::State, &mut Stack<'_, Q::Item>),
-) -> bool {
-    let ChildKind::Leaf(leaf) = child.kind() else {
-        return false;
-    };
-    let (improved, occluder) = batch.with_condition(index, |condition| {
-        Q::confirm_when(state, stack, (bvh, view), (leaf, lanes), ray, condition)
-    });
-    if let Some(occluder) = occluder {
-        batch.report_occluder(index, occluder);
-    }
-    improved
-}
-
-/// Whether the filter of a batch accepts the hit on a triangle that may count.
-#[inline(never)]
-fn accepts(
-    (batch, index): (&RayBatch<'_>, usize),
-    (block, lane): (&TriangleBlock, usize),
-    (ray, interval): (&RaySetup, Interval),
+fn settle_when<Q: Query>(
+    state: &mut Q::State,
+    hit: &CutoutHit<'_>,
+    ray: &RaySetup,
     filters: &Filters,
+    owner: Owner<'_>,
 ) -> bool {
-    let hit = block.hit(lane, ray, filters, QueryKind::Occluded);
-    hit.is_some_and(|hit| batch.accepts(index, &reported(hit, ray, interval)))
-}
-
-/// Reports the hit of a ray.
-#[inline(never)]
-fn report_surface<Q: StreamQuery>(
-    batch: &RayBatch<'_>,
-    index: usize,
-    state: &Q::State,
-    (leaf, instance): (Child, u32),
-) {
-    if let Some(hit) = Q::hit(state) {
-        let found = LocatedHit {
-            hit,
-            leaf,
-            instance,
-        };
-        batch.report_surface(index, &found);
-    }
+    owner.with(|condition| Q::settle(state, hit, ray, filters, condition))
 }
 
 /// A stream on its way. The arrays are separate variables behind references, so that the compiler sees that a write to
 /// one of them does not change another.
-struct Flight<'a, S, Q: StreamQuery, V, const N: usize, const CAREFUL: bool> {
+struct Flight<'a, S, Q: Query, V, const N: usize> {
     simd: S,
     bvh: &'a WideTree<'a, N>,
     views: V,
     leaf_places: &'a LeafPlaces,
     prefetch: bool,
     batch: &'a RayBatch<'a>,
-    /// Whether the stream decides about every hit.
-    decides: bool,
-    /// Whether it decides by which primitive it is.
-    by_name: bool,
     /// Indices of the rays to come.
     pending: core::slice::Iter<'a, u32>,
     answers: &'a mut [Q::Answer],
@@ -304,20 +232,14 @@ struct Flight<'a, S, Q: StreamQuery, V, const N: usize, const CAREFUL: bool> {
     tops: &'a mut [u32; SLOTS],
     /// Per slot: the child that the ray goes on with.
     next: &'a mut [u32; SLOTS],
-    /// Per slot: the lanes of its leaf that are left to be confirmed, as bits.
+    /// Per slot: the lanes of its leaf that are left to be judged, as bits.
     lanes: &'a mut [u32; SLOTS],
-    /// Per slot: the instance where the ray is, or the world.
-    spaces: &'a mut [Space; SLOTS],
-    /// Per slot: the leaf of the best hit, and the index of its instance.
-    leaves: &'a mut [(Child, u32); SLOTS],
     deferred: &'a mut Deferred,
     /// Slots that have a ray, or are to take one. The others are skipped: a few rays cost no more than they must.
     live: Slots,
 }
 
-impl<S: Simd + Width<N>, Q: StreamQuery, V: Views, const N: usize, const CAREFUL: bool>
-    Flight<'_, S, Q, V, N, CAREFUL>
-{
+impl<'a, S: Simd + Width<N>, Q: Query, V: Views, const N: usize> Flight<'a, S, Q, V, N> {
     #[inline(always)]
     fn empty_stacks(&mut self) {
         for id in self.live {
@@ -394,9 +316,6 @@ impl<S: Simd + Width<N>, Q: StreamQuery, V: Views, const N: usize, const CAREFUL
     fn exit_instances(&mut self, slots: Slots) {
         for id in slots {
             self.setups[id] = self.worlds[id];
-            if CAREFUL {
-                self.spaces[id] = Space::WORLD;
-            }
             Q::exit(&mut self.states[id]);
         }
     }
@@ -407,10 +326,7 @@ impl<S: Simd + Width<N>, Q: StreamQuery, V: Views, const N: usize, const CAREFUL
         for id in done {
             if let Some(answer) = self.answers.get_mut(self.ray_indices[id]) {
                 *answer = Q::finish(&self.states[id]);
-                if CAREFUL && Q::CONFIRMS && self.batch.reports_surfaces() {
-                    let index = self.ray_indices[id];
-                    report_surface::<Q>(self.batch, index, &self.states[id], self.leaves[id]);
-                }
+                Q::report(&self.states[id], self.batch, self.ray_indices[id]);
                 self.ray_indices[id] = usize::MAX;
             }
             let mut is_used_up = true;
@@ -421,9 +337,6 @@ impl<S: Simd + Width<N>, Q: StreamQuery, V: Views, const N: usize, const CAREFUL
                 let ray = &self.batch.rays[index];
                 if self.setups[id].set(self.simd, ray, self.bvh.reach) {
                     self.states[id] = Q::begin(ray);
-                    if CAREFUL {
-                        self.spaces[id] = Space::WORLD;
-                    }
                     self.ray_indices[id] = index;
                     self.next[id] = Child::ROOT.0;
                     nodes.add(id);
@@ -489,7 +402,14 @@ impl<S: Simd + Width<N>, Q: StreamQuery, V: Views, const N: usize, const CAREFUL
     fn collect_cutouts(&mut self, slots: Slots) {
         for id in slots {
             let block = block(self.bvh, self.next, id);
-            let found = Q::cutout_hits(&self.states[id], self.simd, block, &self.setups[id]);
+            let ray = &self.setups[id];
+            let found = match Q::KIND {
+                QueryKind::Occluded => block.triangles.vector_occluders(self.simd, ray),
+                QueryKind::Intersect => {
+                    let limit = Q::limit(&self.states[id], ray);
+                    block.triangles.vector_hits(self.simd, ray, limit)
+                }
+            };
             self.deferred.add(id, &found);
         }
         self.deferred.look_up(self.simd, &self.bvh.filters, |id| {
@@ -505,25 +425,16 @@ impl<S: Simd + Width<N>, Q: StreamQuery, V: Views, const N: usize, const CAREFUL
             let index = Child(self.next[id]).index();
             let placed = &self.bvh.instances[index];
             self.worlds[id] = self.setups[id];
-            let view = self.view(id);
+            let (view, owner, inst_id) = (self.view(id), self.owner(id), placed.placement.inst_id);
             let (world, object) = (&self.worlds[id], &mut self.setups[id]);
-            let inst_id = placed.placement.inst_id;
-            let may_count = |condition: &Condition<'_>| condition.enters(inst_id);
-            let enters =
-                !self.decides || (self.batch).with_condition(self.ray_indices[id], may_count);
+            let enters = !Q::CONDITIONAL || owner.enters(inst_id);
             let entered = match enters {
                 true => view.place(self.simd, self.bvh, index, world, object),
                 false => None,
             };
             match entered {
                 Some(interval) => {
-                    Q::enter(&mut self.states[id], self.bvh, index, interval);
-                    if CAREFUL {
-                        self.spaces[id] = Space {
-                            interval,
-                            instance: index as u32,
-                        };
-                    }
+                    Q::enter(&mut self.states[id], inst_id, index, interval);
                     let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
                     stack.push(Q::Item::unordered(Child::EXIT));
                     self.tops[id] = stack.top();
@@ -534,128 +445,86 @@ impl<S: Simd + Width<N>, Q: StreamQuery, V: Views, const N: usize, const CAREFUL
         }
     }
 
-    /// One leaf step for every slot that has come to a leaf of anything but cut-outs. Returns the slots in
-    /// which lanes are left to be confirmed.
+    /// The first half of a leaf step for every slot that has come to a leaf of anything but cut-outs. Returns the slots in which
+    /// lanes are left to be judged.
     #[inline(always)]
     fn test_leaves(&mut self, slots: Slots) -> Slots {
-        let mut undecided = Slots(0);
+        let mut waiting = Slots(0);
+        for id in slots {
+            let seen = (self.bvh, self.view(id));
+            let (state, ray) = (&self.states[id], &self.setups[id]);
+            // Known last, so that nothing stands between it and what is done by its kind.
+            let Some(leaf) = self.leaf(id) else {
+                continue;
+            };
+            let lanes = leaf_lanes::<S, Q, _, N, true>(state, self.simd, seen, leaf, ray);
+            if Q::JUDGES {
+                self.lanes[id] = lanes;
+                waiting.0 |= u64::from(lanes != 0) << id;
+            } else {
+                self.prune(id, lanes != 0);
+            }
+        }
+        waiting
+    }
+
+    /// The second half: judges the lanes that are left.
+    #[inline(always)]
+    fn judge_leaves(&mut self, slots: Slots) {
         for id in slots {
             let Some(leaf) = self.leaf(id) else {
                 continue;
             };
-            let (simd, view) = (self.simd, self.view(id));
-            let decides = CAREFUL && self.decides;
-            let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
+            let (seen, owner) = ((self.bvh, self.view(id)), self.owner(id));
+            let at = (leaf, self.lanes[id]);
             let (state, ray) = (&mut self.states[id], &self.setups[id]);
-            let left =
-                Q::leaf_in_stream(state, &mut stack, simd, self.bvh, view, leaf, ray, decides);
-            self.tops[id] = stack.top();
-            self.lanes[id] = left;
-            undecided.0 |= u64::from(left != 0) << id;
-        }
-        undecided
-    }
-
-    /// Decides about the lanes that are left.
-    #[inline(always)]
-    fn confirm_hits(&mut self, slots: Slots) {
-        for id in slots {
-            let Some(leaf) = self.leaf(id) else {
-                continue;
-            };
-            let (at, view) = ((leaf, self.lanes[id]), self.view(id));
-            let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
-            let (state, ray) = (&mut self.states[id], &self.setups[id]);
-            let improved = Q::confirm(state, &mut stack, self.simd, self.bvh, view, at, ray);
-            self.tops[id] = stack.top();
-            if CAREFUL && improved {
-                self.note_leaf(id);
-            }
+            let changed = judge_lanes::<S, Q, _, N>(state, self.simd, seen, at, ray, owner);
+            self.prune(id, changed);
         }
     }
 
-    /// Decides which lanes of a leaf that are left fulfil the condition of their ray. Occlusion by triangles is decided
-    /// in this function, because they are surely hit, anything else in `confirm_when`.
+    /// The ray of a slot, as the owner of its condition.
     #[inline(always)]
-    fn confirm_leaf(&mut self, id: usize) {
-        let lanes = self.lanes[id];
-        let block = match self.leaf(id) {
-            Some(leaf) if !Q::CONFIRMS && leaf.kind == PrimKind::Triangle => {
-                self.view(id).triangles(self.simd, self.bvh, leaf.index)
-            }
-            _ => return self.confirm_when(id, lanes),
-        };
-        let index = self.ray_indices[id];
-        for lane in LanesOf(lanes) {
-            let occluder = named(block.id(lane), &self.setups[id]);
-            if self.batch.may_count(index, occluder)
-                && (self.by_name || {
-                    let ray = (&self.setups[id], self.spaces[id].interval);
-                    accepts((self.batch, index), (&block, lane), ray, &self.bvh.filters)
-                })
-            {
-                let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
-                Q::occlude(&mut self.states[id], &mut stack);
-                self.tops[id] = stack.top();
-                self.batch.report_occluder(index, occluder);
-                return;
-            }
+    fn owner(&self, id: usize) -> Owner<'a> {
+        Owner {
+            batch: Q::CONDITIONAL.then_some(self.batch),
+            index: self.ray_indices[id],
         }
     }
 
-    /// Decides which of these lanes of the leaf of a slot fulfil the condition of its ray.
+    /// Drops from the stack of a slot what its leaf has made needless.
     #[inline(always)]
-    fn confirm_when(&mut self, id: usize, lanes: u32) {
-        let (child, view) = (Child(self.next[id]), self.view(id));
+    fn prune(&mut self, id: usize, changed: bool) {
         let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
-        let (state, index) = (&mut self.states[id], self.ray_indices[id]);
-        let ray = (&self.setups[id], self.spaces[id].interval);
-        let improved = confirm_when::<Q, _, N>(
-            (self.bvh, view),
-            (self.batch, index),
-            (child, lanes),
-            ray,
-            (state, &mut stack),
-        );
+        let leaf = Child(self.next[id]);
+        Q::prune(&mut self.states[id], &mut stack, self.simd, leaf, changed);
         self.tops[id] = stack.top();
-        if improved {
-            self.note_leaf(id);
-        }
     }
 
-    /// The best hit of a slot is in the leaf where it is.
-    #[inline(always)]
-    fn note_leaf(&mut self, id: usize) {
-        self.leaves[id] = (Child(self.next[id]), self.spaces[id].instance);
-    }
-
-    /// The leaf of anything but cut-outs to which a slot has come.
+    /// The leaf to which a slot has come.
     #[inline(always)]
     fn leaf(&self, id: usize) -> Option<Leaf> {
         match Child(self.next[id]).kind() {
-            ChildKind::Leaf(leaf) if leaf.kind != PrimKind::Cutout => Some(leaf),
+            ChildKind::Leaf(leaf) => Some(leaf),
             _ => None,
         }
     }
 
-    /// Decides about the deferred hits.
+    /// Judges the deferred hits.
     #[inline(always)]
     fn settle_cutouts(&mut self) {
         for index in 0..self.deferred.clear() {
             let (id, hit) = self
                 .deferred
                 .get(index, |id| block(self.bvh, self.next, id));
-            if CAREFUL && self.decides {
-                self.confirm_when(id, 1 << hit.lane);
-                continue;
-            }
-            let mut stack = Stack::resume(self.items, id * self.stride, self.tops[id]);
+            let owner = self.owner(id);
             let (state, ray) = (&mut self.states[id], &self.setups[id]);
-            let improved = Q::settle(state, &mut stack, self.simd, &hit, ray, &self.bvh.filters);
-            self.tops[id] = stack.top();
-            if CAREFUL && improved {
-                self.note_leaf(id);
-            }
+            let filters = &self.bvh.filters;
+            let changed = match Q::CONDITIONAL {
+                false => Q::settle(state, &hit, ray, filters, &Condition::NONE),
+                true => settle_when::<Q>(state, &hit, ray, filters, owner),
+            };
+            self.prune(id, changed);
         }
     }
 }

@@ -249,7 +249,7 @@ impl<'a> CutoutHit<'a> {
     /// so it is called last.
     #[inline(always)]
     pub fn improves(&self, best: &mut Best, ray: &RaySetup, filters: &Filters) -> bool {
-        best.offer_if(self.hit(), || {
+        best.offer_if(self.hit(), |_| {
             self.counts(QueryKind::Intersect, ray, filters)
         })
     }

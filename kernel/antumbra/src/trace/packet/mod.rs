@@ -30,11 +30,12 @@ use crate::geometry::{BLOCK, PrimRef};
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, INVALID_ID};
 use crate::trace::condition::Condition;
+use crate::trace::judge;
 use crate::trace::packet::rays::{
     Frustum, LeafRays, PacketRays, RAYS, RayLanes, Row, row, touched,
 };
 use crate::trace::pick::Children;
-use crate::trace::query::{Closest, Occlusion, StreamQuery};
+use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::ray_batch::{LocatedHit, RayBatch};
 use crate::trace::stack::Stack;
 use crate::tree::node::{Child, ChildKind, Leaf};
@@ -106,27 +107,19 @@ impl<const N: usize> Packet<'_, N> {
             geom_id,
             prim_id,
         };
-        let by_name = self.batch.decides_by_name();
         let mut counting = 0;
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % RAYS;
             lanes &= lanes - 1;
             let index = self.first + lane;
-            let by_condition = |condition: &Condition<'_>| {
-                condition.may_count(id)
-                    && condition.accept.is_none_or(|accept| {
-                        let ray = self.rays.sheared(lane, axes);
-                        let seen = ShearedTriangle::new(&corners, &ray);
-                        let [u, v] = seen.barycentrics();
-                        let t = seen.distance(&ray);
-                        t.is_some_and(|t| accept(&block.hit_at(triangle, [t, u, v]).told()))
-                    })
+            let hit = || {
+                let ray = self.rays.sheared(lane, axes);
+                let seen = ShearedTriangle::new(&corners, &ray);
+                let [u, v] = seen.barycentrics();
+                Some(block.hit_at(triangle, [seen.distance(&ray)?, u, v]).told())
             };
-            let counts = match by_name {
-                true => self.batch.may_count(index, id),
-                false => self.batch.with_condition(index, by_condition),
-            };
-            if counts {
+            let occludes = |condition: &Condition<'_>| judge::occludes(id, condition, || true, hit);
+            if self.batch.with_condition(index, occludes) {
                 self.batch.report_occluder(index, id);
                 counting |= 1 << lane;
             }
@@ -140,13 +133,13 @@ impl<const N: usize> Packet<'_, N> {
     fn counts(&self, lane: usize, hit: &Hit) -> bool {
         let index = self.first + lane;
         (self.batch).with_condition(index, |condition| {
-            condition.is_behind(hit) && condition.counts(&hit.told())
+            condition.may_count(PrimId::from(hit.told())) && judge::counts(hit, condition)
         })
     }
 }
 
 /// A query that can be answered in packets.
-pub(crate) trait PacketQuery: StreamQuery {
+pub(crate) trait PacketQuery: Query {
     /// Traces a packet and writes the answers of its rays. Returns the lanes whose rays are left undecided. `guess` is
     /// the block of triangles that occluded the packet before, if that may be of use, and is set to the block
     /// that occludes this one.
@@ -365,7 +358,7 @@ fn occluded<S: Simd, const N: usize>(
     mut triangles: u32,
     active: u32,
 ) -> u32 {
-    let decides = packet.batch.decides();
+    let is_conditional = packet.batch.is_conditional();
     let mut occluded = 0;
     while triangles != 0 {
         let lane = triangles.trailing_zeros() as usize % BLOCK;
@@ -380,7 +373,7 @@ fn occluded<S: Simd, const N: usize>(
         if doubtful != 0 {
             found |= settled(block, lane, packet.rays, axes, doubtful);
         }
-        if decides {
+        if is_conditional {
             found &= active & !occluded;
             if found != 0 {
                 found = packet.occluders(block, lane, axes, found);
@@ -544,7 +537,7 @@ impl BestOfLanes {
         leaf_rays: &LeafRays<S>,
         mut triangles: u32,
     ) -> bool {
-        let (rays, decides) = (packet.rays, packet.batch.decides());
+        let (rays, is_conditional) = (packet.rays, packet.batch.is_conditional());
         let zero = RayLanes::<S>::splat(simd, 0.0);
         let mut improved = false;
         while triangles != 0 {
@@ -598,7 +591,7 @@ impl BestOfLanes {
                     inst_id: INVALID_ID,
                 };
                 let precedes = self.found & bit == 0 || hit.precedes(&self.hits[lane]);
-                if precedes && (!decides || packet.counts(lane, &hit)) {
+                if precedes && (!is_conditional || packet.counts(lane, &hit)) {
                     self.hits[lane] = hit;
                     self.leaves[lane] = leaf;
                     self.distances[lane] = t;
