@@ -341,7 +341,8 @@ impl<'a> Batch<'a> {
     fn each<A>(&self, answers: &mut [A], answer: impl Fn(Moment<'a>, &Ray, &Condition<'_>) -> A) {
         for (place, found) in answers.iter_mut().enumerate() {
             let (moment, ray) = (self.moment(place), self.ray(place));
-            *found = (self.conditions).with(place, |condition| answer(moment, &ray, condition));
+            let answer = |condition: &Condition<'_>| answer(moment, &ray, condition);
+            *found = self.conditions.with(place, None, answer);
         }
     }
 

@@ -44,16 +44,16 @@ pub(crate) struct VectorHits<S: Simd> {
 }
 
 /// Lanes given as bits, in ascending order.
-pub(crate) struct LanesOf(pub u32);
+pub(crate) struct LanesOf<const N: usize = BLOCK>(pub u32);
 
-impl Iterator for LanesOf {
+impl<const N: usize> Iterator for LanesOf<N> {
     type Item = usize;
 
     #[inline(always)]
     fn next(&mut self) -> Option<usize> {
         let lane = self.0.trailing_zeros() as usize;
         self.0 &= self.0.wrapping_sub(1);
-        (lane < BLOCK).then_some(lane)
+        (lane < N).then_some(lane)
     }
 }
 
@@ -178,7 +178,7 @@ impl TriangleBlock {
     #[inline(never)]
     fn settled(&self, lanes: u32, ray: &RaySetup) -> u32 {
         let is_hit = |&lane: &usize| self.seen(lane, ray).distance(&ray.sheared()).is_some();
-        let hits = LanesOf(lanes).filter(is_hit);
+        let hits = LanesOf::<BLOCK>(lanes).filter(is_hit);
         hits.fold(0, |bits, lane| bits | 1 << lane)
     }
 

@@ -52,8 +52,13 @@ impl Conditions<'_> {
             }
     }
 
-    /// Runs `work` with the condition of the ray at this place.
-    pub fn with<R>(&self, place: usize, work: impl FnOnce(&Condition<'_>) -> R) -> R {
+    /// Runs `work` with the condition of the ray at this place, for hits behind `after`.
+    pub fn with<R>(
+        &self,
+        place: usize,
+        after: Option<Hit>,
+        work: impl FnOnce(&Condition<'_>) -> R,
+    ) -> R {
         let filter = self
             .filter
             .map(|filter| move |hit: &Hit| filter(place, hit));
@@ -68,7 +73,7 @@ impl Conditions<'_> {
                 Some(filter) => Some(filter),
                 None => None,
             },
-            after: None,
+            after,
         })
     }
 }

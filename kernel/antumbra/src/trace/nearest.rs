@@ -498,7 +498,7 @@ impl Waiting {
             let (mut least2, mut most2) = ([0.0; BLOCK], [0.0; BLOCK]);
             bounds.least2.store(&mut least2);
             bounds.most2.store(&mut most2);
-            for lane in LanesOf(near) {
+            for lane in LanesOf::<BLOCK>(near) {
                 self.triangles[self.len % Self::MOST] = Lane {
                     bound2: least2[lane],
                     leaf,

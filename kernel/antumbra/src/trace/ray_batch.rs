@@ -175,12 +175,8 @@ impl<'a> RayBatch<'a> {
     pub fn with_condition<R>(&self, index: usize, work: impl FnOnce(&Condition<'_>) -> R) -> R {
         let after = self.after.map(|after| after[self.start + index]);
         match self.conditions {
-            Some(conditions) => conditions.with(self.place(index), |condition| {
-                work(&Condition {
-                    after,
-                    ..*condition
-                })
-            }),
+            Some(conditions) => conditions.with(self.place(index), after, work),
+            None if after.is_none() => work(self.condition),
             None => work(&Condition {
                 after,
                 ..*self.condition

@@ -7,6 +7,7 @@ use core::ops::Range;
 use antumbra_simd::{Simd, Width};
 
 use crate::geometry::ray_setup::max;
+use crate::geometry::triangle::LanesOf;
 use crate::trace::packet::fans::{above, lane_of};
 use crate::trace::packet::group::{Found, Rows, Tally, Way, is_above, trace_packet};
 use crate::trace::packet::rays::{LeafRays, MAX_SPREAD, PacketRays, RAYS};
@@ -93,10 +94,7 @@ impl<'a> Beams<'a> {
         let batch = RayBatch::new(&[], 0);
         let has_normals = !self.rows.normals.is_empty();
         for (sheaf, guesses) in sheaves.iter().zip(guesses.chunks_exact_mut(RAYS)) {
-            let mut directions = sheaf.lanes;
-            while directions != 0 {
-                let which = directions.trailing_zeros() as usize % RAYS;
-                directions &= directions - 1;
+            for which in LanesOf::<RAYS>(sheaf.lanes) {
                 let column = sheaf.columns[which];
                 let dir = lane_of(&sheaf.dir, which);
                 let lanes = if has_normals {
@@ -107,7 +105,7 @@ impl<'a> Beams<'a> {
                 if lanes == 0 {
                     continue;
                 }
-                let mut left = lanes;
+                let mut traced = [0, lanes];
                 let tries = lanes.count_ones() >= FEW && tally.luck.tries();
                 let frustum = if tries {
                     sheaf.beam(which, self.corners, self.reach, self.ends)
@@ -129,24 +127,11 @@ impl<'a> Beams<'a> {
                         first: 0,
                     };
                     let guess = &mut guesses[which];
-                    let traced = trace_packet(simd, &packet, &leaf_rays, stack, guess, tally);
-                    let mut free = traced[0];
-                    left = traced[1];
-                    while free != 0 {
-                        let lane = free.trailing_zeros() as usize % RAYS;
-                        found.set(self.range.start + lane, column);
-                        free &= free - 1;
-                    }
+                    traced = trace_packet(simd, &packet, &leaf_rays, stack, guess, tally);
                 } else {
                     tally.skip(lanes.count_ones());
                 }
-                while left != 0 {
-                    let lane = left.trailing_zeros() as usize % RAYS;
-                    found
-                        .pending
-                        .push([(self.range.start + lane) as u32, column]);
-                    left &= left - 1;
-                }
+                found.add(traced, |lane| (self.range.start + lane, column));
             }
         }
     }
@@ -155,12 +140,10 @@ impl<'a> Beams<'a> {
     #[inline(always)]
     fn facing<S: Simd>(&self, simd: S, dir: [f32; 3], largest: f32) -> u32 {
         let size = self.largest * largest;
-        let (sure, mut doubtful) = above(simd, &self.normals, dir, size, self.lanes);
+        let (sure, doubtful) = above(simd, &self.normals, dir, size, self.lanes);
         let mut lanes = sure;
-        while doubtful != 0 {
-            let lane = doubtful.trailing_zeros() as usize % RAYS;
+        for lane in LanesOf::<RAYS>(doubtful) {
             lanes |= u32::from(is_above(lane_of(&self.normals, lane), dir)) << lane;
-            doubtful &= doubtful - 1;
         }
         lanes
     }

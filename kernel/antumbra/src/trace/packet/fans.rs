@@ -8,6 +8,7 @@ use core::ops::Range;
 use antumbra_simd::{Lanes, Mask, Simd, Width};
 
 use crate::geometry::ray_setup::max;
+use crate::geometry::triangle::LanesOf;
 use crate::trace::packet::group::{Found, Tally, Way, is_above, trace_packet};
 use crate::trace::packet::rays::{LeafRays, PacketRays, RAYS, RayLanes};
 use crate::trace::packet::sheaf::Sheaf;
@@ -48,7 +49,7 @@ pub(super) fn trace<S: Simd + Width<N>, const N: usize>(
             if lanes == 0 {
                 continue;
             }
-            let mut left = lanes;
+            let mut traced = [0, lanes];
             let tries = goes_together && lanes.count_ones() >= FEW && tally.luck.tries();
             let frustum = if tries {
                 sheaf.frustum(org, reach, ends)
@@ -67,22 +68,11 @@ pub(super) fn trace<S: Simd + Width<N>, const N: usize>(
                     batch: &batch,
                     first: 0,
                 };
-                let traced = trace_packet(simd, &packet, &leaf_rays, stack, &mut last, tally);
-                let mut free = traced[0];
-                left = traced[1];
-                while free != 0 {
-                    let lane = free.trailing_zeros() as usize % RAYS;
-                    found.set(row, sheaf.columns[lane]);
-                    free &= free - 1;
-                }
+                traced = trace_packet(simd, &packet, &leaf_rays, stack, &mut last, tally);
             } else {
                 tally.skip(lanes.count_ones());
             }
-            while left != 0 {
-                let lane = left.trailing_zeros() as usize % RAYS;
-                found.pending.push([row as u32, sheaf.columns[lane]]);
-                left &= left - 1;
-            }
+            found.add(traced, |lane| (row, sheaf.columns[lane]));
         }
     }
 }
@@ -91,12 +81,10 @@ pub(super) fn trace<S: Simd + Width<N>, const N: usize>(
 #[inline(always)]
 fn facing<S: Simd>(simd: S, sheaf: &Sheaf, normal: [f32; 3]) -> u32 {
     let size = max(max(normal[0].abs(), normal[1].abs()), normal[2].abs());
-    let (sure, mut doubtful) = above(simd, &sheaf.dir, normal, size * sheaf.largest, sheaf.lanes);
+    let (sure, doubtful) = above(simd, &sheaf.dir, normal, size * sheaf.largest, sheaf.lanes);
     let mut lanes = sure;
-    while doubtful != 0 {
-        let lane = doubtful.trailing_zeros() as usize % RAYS;
+    for lane in LanesOf::<RAYS>(doubtful) {
         lanes |= u32::from(is_above(normal, lane_of(&sheaf.dir, lane))) << lane;
-        doubtful &= doubtful - 1;
     }
     lanes
 }

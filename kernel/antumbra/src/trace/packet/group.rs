@@ -8,12 +8,13 @@ use alloc::vec::Vec;
 
 use antumbra_simd::{Simd, Width, WithSimd};
 
+use crate::geometry::triangle::LanesOf;
 use crate::ray::Ray;
 use crate::trace::packet::beams::Beams;
 use crate::trace::packet::fans;
 use crate::trace::packet::rays::{LeafRays, RAYS};
 use crate::trace::packet::sheaf::Sheaf;
-use crate::trace::packet::{Luck, Occluded, Packet, find_occluders, guessed};
+use crate::trace::packet::{Luck, Occluded, Packet, occlude};
 use crate::tree::wide::WideTree;
 
 /// Ray origins, one per row, with the intervals of their rays.
@@ -110,6 +111,17 @@ impl Found<'_> {
     pub fn set(&mut self, row: usize, column: u32) {
         let column = column as usize;
         self.open[row * self.words + column / 64] |= 1 << (column % 64);
+    }
+
+    /// Nothing is in the way of rays in these lanes, and others are left. `at` says where the ray of a lane is.
+    #[inline(always)]
+    pub fn add(&mut self, [free, left]: [u32; 2], at: impl Fn(usize) -> (usize, u32)) {
+        for (row, column) in LanesOf::<RAYS>(free).map(&at) {
+            self.set(row, column);
+        }
+        let left = LanesOf::<RAYS>(left).map(at);
+        self.pending
+            .extend(left.map(|(row, column)| [row as u32, column]));
     }
 }
 
@@ -255,14 +267,11 @@ pub(super) fn trace_packet<S: Simd + Width<N>, const N: usize>(
     guess: &mut Option<u32>,
     tally: &mut Tally,
 ) -> [u32; 2] {
+    let way = occlude(simd, packet, leaf_rays, stack, guess);
     let count = packet.lanes.count_ones();
-    let active = packet.lanes & !guessed(simd, packet, leaf_rays, *guess);
-    if active == 0 {
-        tally.guessed(count);
-        return [0, 0];
+    match way.work {
+        0 => tally.guessed(count),
+        _ => tally.count(count, &way),
     }
-    let way = find_occluders(simd, packet, leaf_rays, stack, active);
-    tally.count(count, &way);
-    *guess = way.block;
-    [active & !(way.occluded | way.left), way.left]
+    [packet.lanes & !(way.occluded | way.left), way.left]
 }

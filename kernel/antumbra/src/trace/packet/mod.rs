@@ -24,7 +24,7 @@ use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 use crate::geometry::edge_test::{Corners, Edges, Ends, Verdict};
 use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::primitives::PrimKind;
-use crate::geometry::triangle::TriangleBlock;
+use crate::geometry::triangle::{LanesOf, TriangleBlock};
 use crate::geometry::triangle_hit::{ShearedTriangle, distances};
 use crate::geometry::{BLOCK, PrimRef};
 use crate::prim_id::PrimId;
@@ -98,7 +98,7 @@ impl<const N: usize> Packet<'_, N> {
         block: &TriangleBlock,
         triangle: usize,
         axes: [usize; 3],
-        mut lanes: u32,
+        lanes: u32,
     ) -> u32 {
         let corners = block.corners_of(triangle, axes);
         let PrimRef { geom_id, prim_id } = block.id(triangle).told();
@@ -108,9 +108,7 @@ impl<const N: usize> Packet<'_, N> {
             prim_id,
         };
         let mut counting = 0;
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize % RAYS;
-            lanes &= lanes - 1;
+        for lane in LanesOf::<RAYS>(lanes) {
             let index = self.first + lane;
             let hit = || {
                 let ray = self.rays.sheared(lane, axes);
@@ -224,10 +222,7 @@ impl<Q: PacketQuery, const N: usize> WithSimd<N> for Packets<'_, Q, N> {
             }
             left |= todo;
             luck.count(left.count_ones() as usize <= RAYS / 2);
-            while left != 0 {
-                pending.push(first + left.trailing_zeros());
-                left &= left - 1;
-            }
+            pending.extend(LanesOf::<RAYS>(left).map(|lane| first + lane as u32));
         }
         pending.extend(grouped as u32..batch.rays.len() as u32);
     }
@@ -243,18 +238,11 @@ impl PacketQuery for Occlusion {
         answers: &mut [bool; RAYS],
         guess: &mut Option<u32>,
     ) -> u32 {
-        let guessed = guessed(simd, packet, leaf_rays, *guess);
-        let (mut occluded, mut left) = (guessed, 0);
-        if packet.lanes & !guessed != 0 {
-            let way = find_occluders(simd, packet, leaf_rays, stack, packet.lanes & !guessed);
-            *guess = way.block;
-            left = way.left;
-            occluded |= way.occluded;
-        }
+        let way = occlude(simd, packet, leaf_rays, stack, guess);
         for lane in 0..RAYS {
-            answers[lane] |= occluded >> lane & 1 == 1;
+            answers[lane] |= way.occluded >> lane & 1 == 1;
         }
-        left
+        way.left
     }
 }
 
@@ -263,10 +251,34 @@ struct Occluded {
     occluded: u32,
     /// Rays without an answer, to be traced one by one.
     left: u32,
-    /// The block of triangles that occluded the last of them.
-    block: Option<u32>,
     /// Boxes of nodes, leaves and triangles tested, in units of a node.
     work: u32,
+}
+
+/// Occlusion of a packet. The block of triangles that occluded others before is tested first, and becomes the one that
+/// occludes the last of these, if the tree is searched.
+#[inline(always)]
+fn occlude<S: Simd + Width<N>, const N: usize>(
+    simd: S,
+    packet: &Packet<'_, N>,
+    leaf_rays: &LeafRays<S>,
+    stack: &mut [u32],
+    guess: &mut Option<u32>,
+) -> Occluded {
+    let guessed = guessed(simd, packet, leaf_rays, *guess);
+    if packet.lanes & !guessed == 0 {
+        return Occluded {
+            occluded: guessed,
+            left: 0,
+            work: 0,
+        };
+    }
+    let (way, block) = find_occluders(simd, packet, leaf_rays, stack, packet.lanes & !guessed);
+    *guess = block;
+    Occluded {
+        occluded: way.occluded | guessed,
+        ..way
+    }
 }
 
 /// The rays of a packet that a block of triangles occludes.
@@ -286,7 +298,7 @@ fn guessed<S: Simd, const N: usize>(
     packet.lanes & occluded(simd, block, packet, leaf_rays, near, packet.lanes)
 }
 
-/// Occlusion of the rays in `lanes`.
+/// Occlusion of the rays in `lanes`, and the block of triangles that occluded the last of them.
 #[inline(always)]
 fn find_occluders<S: Simd + Width<N>, const N: usize>(
     simd: S,
@@ -294,7 +306,7 @@ fn find_occluders<S: Simd + Width<N>, const N: usize>(
     leaf_rays: &LeafRays<S>,
     stack: &mut [u32],
     lanes: u32,
-) -> Occluded {
+) -> (Occluded, Option<u32>) {
     /// Work after which the rays go on each for itself.
     const MOST: u32 = 60;
 
@@ -340,12 +352,12 @@ fn find_occluders<S: Simd + Width<N>, const N: usize>(
         }
         next = Child(stack.pop());
     }
-    Occluded {
+    let way = Occluded {
         occluded: lanes & !active,
         left: left & active,
-        block: last,
         work,
-    }
+    };
+    (way, last)
 }
 
 /// The rays that some of the triangles of a block occlude, as bits. Rays outside of `active` may be left out.
@@ -355,14 +367,12 @@ fn occluded<S: Simd, const N: usize>(
     block: &TriangleBlock,
     packet: &Packet<'_, N>,
     leaf_rays: &LeafRays<S>,
-    mut triangles: u32,
+    triangles: u32,
     active: u32,
 ) -> u32 {
     let is_conditional = packet.batch.is_conditional();
     let mut occluded = 0;
-    while triangles != 0 {
-        let lane = triangles.trailing_zeros() as usize % BLOCK;
-        triangles &= triangles - 1;
+    for lane in LanesOf::<BLOCK>(triangles) {
         let corners = corners(simd, block, lane, leaf_rays.axes);
         let sheared = leaf_rays.shear.of::<RAYS>(&corners);
         let edges = Edges::new::<RAYS>(&sheared, leaf_rays.shear.per_z());
@@ -392,13 +402,11 @@ fn settled(
     triangle: usize,
     rays: &PacketRays,
     axes: [usize; 3],
-    mut lanes: u32,
+    lanes: u32,
 ) -> u32 {
     let corners = block.corners_of(triangle, axes);
     let mut hits = 0;
-    while lanes != 0 {
-        let lane = lanes.trailing_zeros() as usize % RAYS;
-        lanes &= lanes - 1;
+    for lane in LanesOf::<RAYS>(lanes) {
         let ray = rays.sheared(lane, axes);
         let is_hit = ShearedTriangle::new(&corners, &ray)
             .distance(&ray)
@@ -453,9 +461,7 @@ impl PacketQuery for Closest {
                     }
                 }
                 ChildKind::Instance(_) if next == Child::DONE => {
-                    let mut found = best.found;
-                    while found != 0 {
-                        let lane = found.trailing_zeros() as usize % RAYS;
+                    for lane in LanesOf::<RAYS>(best.found) {
                         answers[lane] = Some(best.hits[lane].told());
                         if batch.reports_surfaces() {
                             let found = LocatedHit {
@@ -465,7 +471,6 @@ impl PacketQuery for Closest {
                             };
                             batch.report_surface(first + lane, &found);
                         }
-                        found &= found - 1;
                     }
                     return 0;
                 }
@@ -535,14 +540,12 @@ impl BestOfLanes {
         (block, leaf): (&TriangleBlock, Child),
         packet: &Packet<'_, N>,
         leaf_rays: &LeafRays<S>,
-        mut triangles: u32,
+        triangles: u32,
     ) -> bool {
         let (rays, is_conditional) = (packet.rays, packet.batch.is_conditional());
         let zero = RayLanes::<S>::splat(simd, 0.0);
         let mut improved = false;
-        while triangles != 0 {
-            let triangle = triangles.trailing_zeros() as usize % BLOCK;
-            triangles &= triangles - 1;
+        for triangle in LanesOf::<BLOCK>(triangles) {
             let corners = corners(simd, block, triangle, leaf_rays.axes);
             let sheared = leaf_rays.shear.of::<RAYS>(&corners);
             let edges = Edges::new::<RAYS>(&sheared, leaf_rays.shear.per_z());
@@ -560,7 +563,7 @@ impl BestOfLanes {
                 continue;
             }
             let (t, inside) = distances(simd, &sheared, leaf_rays.shear.per_z());
-            let mut hits = (inside & tnear.lt(t) & t.lt(tfar) & t.le(limits)).bits();
+            let hits = (inside & tnear.lt(t) & t.lt(tfar) & t.le(limits)).bits();
             if hits == 0 {
                 continue;
             }
@@ -571,10 +574,8 @@ impl BestOfLanes {
             v.store(&mut values[2]);
             let sure = sure.bits();
             let corners = block.corners_of(triangle, leaf_rays.axes);
-            while hits != 0 {
-                let lane = hits.trailing_zeros() as usize % RAYS;
-                let bit = hits & hits.wrapping_neg();
-                hits ^= bit;
+            for lane in LanesOf::<RAYS>(hits) {
+                let bit = 1 << lane;
                 let [t, u, v] = [values[0][lane], values[1][lane], values[2][lane]];
                 let [u, v] = if sure & bit != 0 {
                     [u, v]
