@@ -15,7 +15,6 @@ use crate::trace::brute_points;
 use crate::trace::inside::{self, Around};
 use crate::trace::memory::Memory;
 use crate::trace::nearest::{Candidate, Nearest, Seeker, Within};
-use crate::tree::any::on_tree;
 
 /// Points that one thread takes at a time.
 const CHUNK: usize = 64;
@@ -211,10 +210,8 @@ impl Bvh {
         if !is_finite(point) {
             return Around::default();
         }
-        self.pool.with(|memory| {
-            let stack = &mut memory.children;
-            on_tree!(&self.tree, tree => inside::around(tree, point, stack))
-        })
+        self.pool
+            .with(|memory| inside::around(&self.tree, point, &mut memory.children))
     }
 
     fn seek(&self, memory: &mut Memory, point: [f32; 3], seeker: &mut dyn Seeker) {

@@ -7,14 +7,12 @@ use antumbra_simd::scratch::{Bits, with_scratch};
 use super::bvh::Bvh;
 use crate::ray::{Hit, Ray};
 use crate::trace::engine::{Each, Table};
-use crate::trace::locate::locate;
 use crate::trace::memory::{Memory, Stored};
 use crate::trace::query::{Closest, Occlusion, Query};
 use crate::trace::ray_batch::{LocatedHit, RayBatch, Report};
 use crate::trace::stack::stack_size;
 use crate::trace::surface::{Surface, surface, unit};
 use crate::trace::view::on_view;
-use crate::tree::any::on_tree;
 
 /// Items of a stack on the program stack: enough for 32 levels of 16 children, 71 of 8 and 167 of 4. Items that a tree
 /// does not need are not written. Deeper trees take their stack from the pool.
@@ -86,9 +84,8 @@ impl Bvh {
     /// ```
     #[must_use]
     pub fn normal(&self, ray: &Ray, hit: &Hit) -> Option<[f32; 3]> {
-        let located = self.with_stack(
-            |stack: &mut [u32]| on_tree!(&self.tree, tree => locate(tree, stack, ray, hit)),
-        )?;
+        let locate = |stack: &mut [u32]| (self.engine.0).locate(&self.tree, stack, ray, hit);
+        let located = self.with_stack(locate)?;
         let normal = located.normal?;
         match located.instance {
             None => unit(&normal, None),
@@ -135,9 +132,8 @@ impl Bvh {
         hits.resize(surfaces.len(), None);
         let cells = Cell::from_mut(surfaces).as_slice_of_cells();
         let report = |index: usize, ray: &Ray, found: &LocatedHit| {
-            let surface = on_tree!(&self.tree, tree => on_view!(batch.share(index), view => {
-                surface(tree, view, ray, found)
-            }));
+            let surface =
+                on_view!(batch.share(index), view => surface(&self.tree, view, ray, found));
             cells[index].set(Some(surface));
         };
         self.intersect_many(

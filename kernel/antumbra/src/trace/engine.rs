@@ -13,6 +13,7 @@ use crate::geometry::ray_setup::RaySetup;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::Condition;
 use crate::trace::instrumented::{Instrumented, Open};
+use crate::trace::locate::{Located as Place, locate};
 use crate::trace::memory::Memory;
 use crate::trace::nearest::{Search, Seeker};
 use crate::trace::observe::Observer;
@@ -227,6 +228,9 @@ pub(crate) trait Table:
         visit: &mut dyn FnMut(Hit) -> Visit,
     ) -> Option<Hit>;
 
+    /// See [`locate`].
+    fn locate(&self, tree: &Tree, stack: &mut [u32], ray: &Ray, hit: &Hit) -> Option<Place>;
+
     /// See [`GroupQuery`]. Returns the row to go on with.
     fn group(&self, tree: &Tree, stack: &mut [u32], part: Part<'_>) -> usize;
 
@@ -382,6 +386,10 @@ impl<S: Simd + Lanes<N>, const N: usize> Table for Compiled<S, N> {
     ) -> Option<Hit> {
         let bvh = &tree.wide::<N>();
         on_view!(share, view => self.0.run(Visiting { bvh, view, ahead, ray, condition, visit }))
+    }
+
+    fn locate(&self, tree: &Tree, stack: &mut [u32], ray: &Ray, hit: &Hit) -> Option<Place> {
+        locate(&tree.wide::<N>(), stack, ray, hit)
     }
 
     fn group(&self, tree: &Tree, stack: &mut [u32], part: Part<'_>) -> usize {

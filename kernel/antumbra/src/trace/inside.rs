@@ -2,12 +2,13 @@
 
 use alloc::vec::Vec;
 
+use crate::aabb::Aabb;
 use crate::geometry::PrimRef;
 use crate::geometry::instance::{Affine, Placement, cross, dot};
 use crate::geometry::leaf_block::LeafBlock;
 use crate::tree::leaves::on_leaf;
-use crate::tree::node::{ChildKind, Node};
-use crate::tree::wide::WideTree;
+use crate::tree::node::ChildKind;
+use crate::tree::wide::Tree;
 
 /// The point in the object of an instance, and the sign by which winding numbers change on the way, negative for
 /// mirrors; `None` where the point lies outside the box of the instance, where its object does not count.
@@ -60,11 +61,7 @@ impl Around {
 }
 
 /// Winding number around a point, which is finite, and whether the point is inside.
-pub(crate) fn around<const N: usize>(
-    tree: &WideTree<N>,
-    point: [f32; 3],
-    memory: &mut Vec<u32>,
-) -> Around {
+pub(crate) fn around(tree: &Tree, point: [f32; 3], memory: &mut Vec<u32>) -> Around {
     let point = point.map(f64::from);
     let mut met = Met::default();
     let mut instances = Vec::new();
@@ -90,9 +87,9 @@ struct Met {
 
 impl Met {
     /// Visits what the half-line may cross below a node. Instances are only listed.
-    fn walk<const N: usize>(
+    fn walk(
         &mut self,
-        tree: &WideTree<N>,
+        tree: &Tree,
         root: usize,
         point: [f64; 3],
         stack: &mut Vec<u32>,
@@ -101,9 +98,9 @@ impl Met {
         stack.clear();
         stack.push(root as u32);
         while let Some(index) = stack.pop() {
-            let node = &tree.nodes[index as usize];
-            for slot in (0..node.any().len()).filter(|slot| is_met(node, *slot, point)) {
-                match node.any().child(slot).kind() {
+            let children = tree.nodes.get(index as usize).children();
+            for (child, _) in children.filter(|(_, bounds)| is_met(bounds, point)) {
+                match child.kind() {
                     ChildKind::Inner(index) => stack.push(index as u32),
                     ChildKind::Leaf(leaf) => on_leaf!(tree, leaf, block => self.add(block, point)),
                     ChildKind::Instance(index) => instances.push(index),
@@ -131,12 +128,10 @@ impl Met {
 
 /// Whether the half-line hits the box of a child.
 #[inline(always)]
-fn is_met<const N: usize>(node: &Node<N>, slot: usize, [x, y, z]: [f64; 3]) -> bool {
-    let lane = Node::<N>::lane(slot);
-    let plane = |axis: usize, side: usize| f64::from(node.planes[axis][side][lane]);
-    (x <= plane(0, 1))
-        & (plane(1, 0) <= y)
-        & (y <= plane(1, 1))
-        & (plane(2, 0) <= z)
-        & (z <= plane(2, 1))
+fn is_met(Aabb { min, max }: &Aabb, [x, y, z]: [f64; 3]) -> bool {
+    (x <= max[0].into())
+        & (f64::from(min[1]) <= y)
+        & (y <= max[1].into())
+        & (f64::from(min[2]) <= z)
+        & (z <= max[2].into())
 }

@@ -86,8 +86,8 @@ fn traverse<S: Simd + Width<N>, Q: Query, V: View, const N: usize>(
                     next
                 }
                 ChildKind::Leaf(leaf) => {
-                    let seen = (bvh, view);
-                    let changed = leaf_step::<S, Q, V, N>(&mut state, simd, seen, leaf, ray, owner);
+                    let seen = (bvh.tree, view);
+                    let changed = leaf_step::<S, Q, V>(&mut state, simd, seen, leaf, ray, owner);
                     Q::prune(&mut state, &mut stack, simd, next, changed);
                     stack.pop().child()
                 }

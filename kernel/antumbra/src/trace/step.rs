@@ -15,7 +15,7 @@ use crate::trace::query::Query;
 use crate::trace::view::{View, on_seen_leaf};
 use crate::tree::leaves::on_leaf;
 use crate::tree::node::Leaf;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 
 /// A vector as wide as a node.
 pub(crate) type NodeLanes<S, const N: usize> = <S as Width<N>>::Lanes;
@@ -73,17 +73,17 @@ impl<S: Simd + Width<N>, const N: usize> NodeTest<S, N> {
 
 /// The leaf step: finds the lanes of a leaf that may count, and judges them. Whether the state has changed.
 #[inline(always)]
-pub(crate) fn leaf_step<S: Simd, Q: Query, V: View, const N: usize>(
+pub(crate) fn leaf_step<S: Simd, Q: Query, V: View>(
     state: &mut Q::State,
     simd: S,
-    seen: (&WideTree<N>, V),
+    seen: (&Tree, V),
     leaf: Leaf,
     ray: &RaySetup,
     owner: Owner<'_>,
 ) -> bool {
-    let lanes = leaf_lanes::<S, Q, V, N, false>(state, simd, seen, leaf, ray);
+    let lanes = leaf_lanes::<S, Q, V, false>(state, simd, seen, leaf, ray);
     lanes != 0
-        && (!Q::JUDGES || judge_lanes::<S, Q, V, N>(state, simd, seen, (leaf, lanes), ray, owner))
+        && (!Q::JUDGES || judge_lanes::<S, Q, V>(state, simd, seen, (leaf, lanes), ray, owner))
 }
 
 /// The lanes of a block that may count, as bits; or, if the query does not [judge](Query::JUDGES), one that does if any do.
@@ -112,27 +112,27 @@ fn lanes<S: Simd, Q: Query, B: LeafBlock, const STREAM: bool>(
 /// are hard to predict, even if it takes longer from end to end: other rays fill the gaps, but a wrong guess throws their work
 /// away too. Leaves of cut-outs do not come here then.
 #[inline(always)]
-pub(crate) fn leaf_lanes<S: Simd, Q: Query, V: View, const N: usize, const STREAM: bool>(
+pub(crate) fn leaf_lanes<S: Simd, Q: Query, V: View, const STREAM: bool>(
     state: &Q::State,
     simd: S,
-    (bvh, view): (&WideTree<N>, V),
+    (tree, view): (&Tree, V),
     leaf: Leaf,
     ray: &RaySetup,
 ) -> u32 {
     match leaf.kind {
         PrimKind::Triangle => {
-            let block = view.triangles(simd, bvh, leaf.index);
-            lanes::<S, Q, _, STREAM>(state, simd, &*block, ray, &bvh.filters)
+            let block = view.triangles(simd, tree, leaf.index);
+            lanes::<S, Q, _, STREAM>(state, simd, &*block, ray, &tree.filters)
         }
         PrimKind::Cutout if !STREAM => {
-            let block = &bvh.blocks.cutouts[leaf.index];
-            lanes::<S, Q, _, STREAM>(state, simd, block, ray, &bvh.filters)
+            let block = &tree.blocks.cutouts[leaf.index];
+            lanes::<S, Q, _, STREAM>(state, simd, block, ray, &tree.filters)
         }
         PrimKind::Curve => {
-            let block = &bvh.blocks.curves[leaf.index];
-            lanes::<S, Q, _, STREAM>(state, simd, block, ray, &bvh.filters)
+            let block = &tree.blocks.curves[leaf.index];
+            lanes::<S, Q, _, STREAM>(state, simd, block, ray, &tree.filters)
         }
-        _ => other_lanes::<Q, N>(state, bvh, leaf, ray),
+        _ => other_lanes::<Q>(state, tree, leaf, ray),
     }
 }
 
@@ -140,62 +140,57 @@ pub(crate) fn leaf_lanes<S: Simd, Q: Query, V: View, const N: usize, const STREA
 /// occlusion in batches (AVX2).
 #[cold]
 #[inline(never)]
-fn other_lanes<Q: Query, const N: usize>(
-    state: &Q::State,
-    bvh: &WideTree<N>,
-    leaf: Leaf,
-    ray: &RaySetup,
-) -> u32 {
-    on_leaf!(bvh, leaf, block => lanes::<Scalar, Q, _, false>(state, Scalar, block, ray, &bvh.filters))
+fn other_lanes<Q: Query>(state: &Q::State, tree: &Tree, leaf: Leaf, ray: &RaySetup) -> u32 {
+    on_leaf!(tree, leaf, block => lanes::<Scalar, Q, _, false>(state, Scalar, block, ray, &tree.filters))
 }
 
 /// The second half: judges these lanes. Whether the state has changed.
 #[inline(always)]
-pub(crate) fn judge_lanes<S: Simd, Q: Query, V: View, const N: usize>(
+pub(crate) fn judge_lanes<S: Simd, Q: Query, V: View>(
     state: &mut Q::State,
     simd: S,
-    (bvh, view): (&WideTree<N>, V),
+    (tree, view): (&Tree, V),
     (leaf, lanes): (Leaf, u32),
     ray: &RaySetup,
     owner: Owner<'_>,
 ) -> bool {
     match (Q::CONDITIONAL, leaf.kind) {
-        (true, _) => judge_lanes_when::<Q, V, N>(state, (bvh, view), (leaf, lanes), ray, owner),
+        (true, _) => judge_lanes_when::<Q, V>(state, (tree, view), (leaf, lanes), ray, owner),
         (false, PrimKind::Triangle) => {
-            let block = view.triangles(simd, bvh, leaf.index);
+            let block = view.triangles(simd, tree, leaf.index);
             let (lanes, condition) = (LanesOf(lanes), &Condition::NONE);
-            Q::judge(state, &*block, lanes, ray, &bvh.filters, condition)
+            Q::judge(state, &*block, lanes, ray, &tree.filters, condition)
         }
-        (false, _) => judge_others::<Q, N>(state, bvh, (leaf, lanes), ray),
+        (false, _) => judge_others::<Q>(state, tree, (leaf, lanes), ray),
     }
 }
 
 /// [`judge_lanes`] for any kind but triangles.
 #[cold]
 #[inline(never)]
-fn judge_others<Q: Query, const N: usize>(
+fn judge_others<Q: Query>(
     state: &mut Q::State,
-    bvh: &WideTree<N>,
+    tree: &Tree,
     (leaf, lanes): (Leaf, u32),
     ray: &RaySetup,
 ) -> bool {
-    on_leaf!(bvh, leaf, block => {
-        Q::judge(state, block, LanesOf(lanes), ray, &bvh.filters, &Condition::NONE)
+    on_leaf!(tree, leaf, block => {
+        Q::judge(state, block, LanesOf(lanes), ray, &tree.filters, &Condition::NONE)
     })
 }
 
 /// [`judge_lanes`] by the condition of the ray.
 #[inline(never)]
-fn judge_lanes_when<Q: Query, V: View, const N: usize>(
+fn judge_lanes_when<Q: Query, V: View>(
     state: &mut Q::State,
-    (bvh, view): (&WideTree<N>, V),
+    (tree, view): (&Tree, V),
     (leaf, lanes): (Leaf, u32),
     ray: &RaySetup,
     owner: Owner<'_>,
 ) -> bool {
     owner.with(|condition| {
-        on_seen_leaf!(Scalar, bvh, view, leaf, block => {
-            Q::judge(state, block, LanesOf(lanes), ray, &bvh.filters, condition)
+        on_seen_leaf!(Scalar, tree, view, leaf, block => {
+            Q::judge(state, block, LanesOf(lanes), ray, &tree.filters, condition)
         })
     })
 }

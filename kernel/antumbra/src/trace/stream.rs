@@ -451,13 +451,13 @@ impl<'a, S: Simd + Width<N>, Q: Query, V: Views, const N: usize> Flight<'a, S, Q
     fn test_leaves(&mut self, slots: Slots) -> Slots {
         let mut waiting = Slots(0);
         for id in slots {
-            let seen = (self.bvh, self.view(id));
+            let seen = (self.bvh.tree, self.view(id));
             let (state, ray) = (&self.states[id], &self.setups[id]);
             // Known last, so that nothing stands between it and what is done by its kind.
             let Some(leaf) = self.leaf(id) else {
                 continue;
             };
-            let lanes = leaf_lanes::<S, Q, _, N, true>(state, self.simd, seen, leaf, ray);
+            let lanes = leaf_lanes::<S, Q, _, true>(state, self.simd, seen, leaf, ray);
             if Q::JUDGES {
                 self.lanes[id] = lanes;
                 waiting.0 |= u64::from(lanes != 0) << id;
@@ -475,10 +475,10 @@ impl<'a, S: Simd + Width<N>, Q: Query, V: Views, const N: usize> Flight<'a, S, Q
             let Some(leaf) = self.leaf(id) else {
                 continue;
             };
-            let (seen, owner) = ((self.bvh, self.view(id)), self.owner(id));
+            let (seen, owner) = ((self.bvh.tree, self.view(id)), self.owner(id));
             let at = (leaf, self.lanes[id]);
             let (state, ray) = (&mut self.states[id], &self.setups[id]);
-            let changed = judge_lanes::<S, Q, _, N>(state, self.simd, seen, at, ray, owner);
+            let changed = judge_lanes::<S, Q, _>(state, self.simd, seen, at, ray, owner);
             self.prune(id, changed);
         }
     }

@@ -15,7 +15,7 @@ use crate::ray::{Hit, Ray};
 use crate::trace::ray_batch::LocatedHit;
 use crate::trace::view::{View, on_seen_leaf};
 use crate::tree::node::ChildKind;
-use crate::tree::wide::WideTree;
+use crate::tree::wide::Tree;
 
 /// A closest hit with its position and normal.
 ///
@@ -48,16 +48,11 @@ pub struct Surface {
 }
 
 /// The surface of a hit that was found.
-pub(crate) fn surface<const N: usize>(
-    bvh: &WideTree<N>,
-    view: impl View,
-    ray: &Ray,
-    found: &LocatedHit,
-) -> Surface {
+pub(crate) fn surface(tree: &Tree, view: impl View, ray: &Ray, found: &LocatedHit) -> Surface {
     let hit = found.hit.told();
     let (mut position, mut normal) = ([0, 1, 2].map(|axis| at(ray, hit.t, axis)), [0.0; 3]);
     let instance = (found.instance != LocatedHit::WORLD).then_some(found.instance as usize);
-    let placed = instance.and_then(|index| view.placed(bvh, index));
+    let placed = instance.and_then(|index| view.placed(tree, index));
     if let ChildKind::Leaf(leaf) = found.leaf.kind() {
         let mut object = RaySetup::IDLE;
         let here = match instance {
@@ -65,13 +60,13 @@ pub(crate) fn surface<const N: usize>(
             // Triangles look only at the hit.
             Some(_) if leaf.kind.is_triangle() => Some(ray),
             // The ray in the object, where the primitive was hit.
-            Some(index) => RaySetup::new(ray, bvh.reach).and_then(|world| {
-                let entered = view.place(Scalar, bvh, index, &world, &mut object);
+            Some(index) => RaySetup::new(ray, tree.reach).and_then(|world| {
+                let entered = view.place(Scalar, tree, index, &world, &mut object);
                 entered.map(|_| &*object)
             }),
         };
         let told = here.and_then(
-            |ray| on_seen_leaf!(Scalar, bvh, view, leaf, block => of_block(block, ray, &found.hit)),
+            |ray| on_seen_leaf!(Scalar, tree, view, leaf, block => of_block(block, ray, &found.hit)),
         );
         if let Some((corners, found_normal)) = told {
             if let Some(corners) = corners {

@@ -60,29 +60,25 @@ pub(crate) trait View: Copy {
     fn prefetch<S: Simd, const N: usize>(simd: S, bvh: &WideTree<'_, N>, index: usize);
 
     /// A block of triangles.
-    fn triangles<S: Simd, const N: usize>(
+    fn triangles<S: Simd>(
         self,
         simd: S,
-        bvh: &WideTree<'_, N>,
+        tree: &Tree,
         index: usize,
     ) -> impl Deref<Target = TriangleBlock>;
 
     /// Makes `object` the ray in the object of instance `index`, unless the ray misses its box.
-    fn place<S: Simd, const N: usize>(
+    fn place<S: Simd>(
         self,
         simd: S,
-        bvh: &WideTree<'_, N>,
+        tree: &Tree,
         index: usize,
         world: &RaySetup,
         object: &mut RaySetup,
     ) -> Option<Interval>;
 
     /// The placement of instance `index`, and its transform.
-    fn placed<const N: usize>(
-        self,
-        bvh: &WideTree<'_, N>,
-        index: usize,
-    ) -> Option<(Placement, [[f32; 4]; 3])>;
+    fn placed(self, tree: &Tree, index: usize) -> Option<(Placement, [[f32; 4]; 3])>;
 }
 
 /// How the rays of a list see a tree.
@@ -127,33 +123,29 @@ impl View for Still {
     }
 
     #[inline(always)]
-    fn triangles<S: Simd, const N: usize>(
+    fn triangles<S: Simd>(
         self,
         _: S,
-        bvh: &WideTree<'_, N>,
+        tree: &Tree,
         index: usize,
     ) -> impl Deref<Target = TriangleBlock> {
-        &bvh.blocks.triangles[index]
+        &tree.blocks.triangles[index]
     }
 
     #[inline(always)]
-    fn place<S: Simd, const N: usize>(
+    fn place<S: Simd>(
         self,
         simd: S,
-        bvh: &WideTree<'_, N>,
+        tree: &Tree,
         index: usize,
         world: &RaySetup,
         object: &mut RaySetup,
     ) -> Option<Interval> {
-        bvh.instances[index].placement.enter(simd, world, object)
+        tree.instances[index].placement.enter(simd, world, object)
     }
 
-    fn placed<const N: usize>(
-        self,
-        bvh: &WideTree<'_, N>,
-        index: usize,
-    ) -> Option<(Placement, [[f32; 4]; 3])> {
-        let placed = &bvh.instances[index];
+    fn placed(self, tree: &Tree, index: usize) -> Option<(Placement, [[f32; 4]; 3])> {
+        let placed = &tree.instances[index];
         Some((placed.placement, placed.world_from_object))
     }
 }
@@ -229,30 +221,30 @@ impl View for At {
     }
 
     #[inline(always)]
-    fn triangles<S: Simd, const N: usize>(
+    fn triangles<S: Simd>(
         self,
         simd: S,
-        bvh: &WideTree<'_, N>,
+        tree: &Tree,
         index: usize,
     ) -> impl Deref<Target = TriangleBlock> {
-        let block = &bvh.blocks.triangles[index];
-        match motion(bvh).and_then(|motion| motion.blocks.get(index)) {
+        let block = &tree.blocks.triangles[index];
+        match motion(tree).and_then(|motion| motion.blocks.get(index)) {
             Some(end) => Block::Moved(block.between(simd, end, self.0)),
             None => Block::Here(block),
         }
     }
 
     #[inline(always)]
-    fn place<S: Simd, const N: usize>(
+    fn place<S: Simd>(
         self,
         simd: S,
-        bvh: &WideTree<'_, N>,
+        tree: &Tree,
         index: usize,
         world: &RaySetup,
         object: &mut RaySetup,
     ) -> Option<Interval> {
-        match &motion(bvh)?.placements[index] {
-            None => Still.place(simd, bvh, index, world, object),
+        match &motion(tree)?.placements[index] {
+            None => Still.place(simd, tree, index, world, object),
             Some(placement) => {
                 let planes = placement.planes(self.0);
                 // The box first: a transform takes as long as many nodes.
@@ -263,13 +255,9 @@ impl View for At {
         }
     }
 
-    fn placed<const N: usize>(
-        self,
-        bvh: &WideTree<'_, N>,
-        index: usize,
-    ) -> Option<(Placement, [[f32; 4]; 3])> {
-        match &motion(bvh)?.placements[index] {
-            None => Still.placed(bvh, index),
+    fn placed(self, tree: &Tree, index: usize) -> Option<(Placement, [[f32; 4]; 3])> {
+        match &motion(tree)?.placements[index] {
+            None => Still.placed(tree, index),
             Some(placement) => placement.at(self.0, placement.planes(self.0)),
         }
     }

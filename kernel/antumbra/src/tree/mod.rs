@@ -6,12 +6,11 @@
 //! - `recollapse`: a tree of one width made from a tree of another
 //! - `arena`: a tree put together from trees of objects;  `refit`: boxes and leaf blocks of primitives that moved
 //! - `validate`: a check of every promise of the wide tree;  `statistics`: its bytes and its cost
-//! - `width`: how many children a node has;  `any`: the switch between widths
+//! - `width`: how many children a node has
 //! - `motion`: what moves between two keys
 //! - `saved`: trees as words of a file, see [`crate::words`]
 //! - `slot_order`: a permutation of the slots of a tree
 
-pub(crate) mod any;
 pub(crate) mod arena;
 pub(crate) mod binary;
 pub(crate) mod costs;

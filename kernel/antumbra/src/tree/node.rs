@@ -192,12 +192,6 @@ impl<const N: usize> Node<N> {
         children: [Child::EMPTY.0; N],
     };
 
-    /// The lane that holds a slot, and the slot that a lane holds.
-    #[inline(always)]
-    pub const fn lane(slot: usize) -> usize {
-        N - 1 - slot
-    }
-
     /// The node whatever its width.
     pub fn any(&self) -> NodeRef<'_> {
         NodeRef {
