@@ -126,7 +126,8 @@ proptest! {
         let read: Bvh = functions_of(&scene, &file);
         let file = world.to_bytes();
         let mut loaded: World = functions_of(&scene, &file);
-        prop_assert!(loaded.to_bytes() == file, "seed {seed}");
+        let is_as_saved = loaded.report().file_width.is_none();
+        prop_assert_eq!(loaded.to_bytes() == file, is_as_saved, "seed {}", seed);
         let rays = scene.rays(&mut rng, 30);
         for ray in &rays {
             let all: [&Bvh; 3] = [&read, &loaded, &world];
