@@ -2,47 +2,67 @@
 
 use antumbra::recipe::Engine;
 use antumbra::{
-    Bvh, Directions, Geometry, Instance, Masks, PrimId, Primitives, Ray, Recipe, Visit,
+    Bvh, Directions, Geometry, Hit, Instance, Masks, PrimId, Primitives, Ray, Recipe, Visit,
 };
 use antumbra_testkit::{Rng, mesh, rays};
 use antumbra_trees::engines;
 
 use crate::{geometry, kernel_ray};
 
-/// Everything that a tree can be asked, but for what learning looks at.
-fn answers(bvh: &Bvh, rays: &[Ray], points: &[[f32; 3]], times: &[f32]) -> String {
+/// What a tree says to every kind of query, by kind.
+fn answers(
+    bvh: &Bvh,
+    rays: &[Ray],
+    points: &[[f32; 3]],
+    times: &[f32],
+) -> Vec<(&'static str, String)> {
     let batch = bvh.batch(rays).at(times);
-    let ids: Vec<PrimId> = (batch.intersect().iter())
-        .map(|hit| hit.map_or(PrimId::NONE, PrimId::from))
-        .collect();
-    let odd = |_: usize, hit: &antumbra::Hit| hit.prim_id % 2 == 1;
-    let mut text = format!("{:?}", batch.intersect());
-    for batch in [
-        batch.mask(1),
-        batch.except(&ids),
-        batch.filter(&odd),
-        batch.closed(),
+    let hits = batch.intersect();
+    let id = |hit: &Option<Hit>| hit.map_or(PrimId::NONE, PrimId::from);
+    let ids: Vec<_> = hits.iter().map(id).collect();
+    let odd = |_: usize, hit: &Hit| hit.prim_id % 2 == 1;
+    let mut found = vec![("all", format!("{hits:?}"))];
+    for (kind, batch) in [
+        ("mask", batch.mask(1)),
+        ("except", batch.except(&ids)),
+        ("filter", batch.filter(&odd)),
+        ("closed", batch.closed()),
     ] {
-        text += &format!("{:?} {:?} ", batch.occluded(), batch.surfaces());
+        found.push((
+            kind,
+            format!("{:?} {:?}", batch.occluded(), batch.surfaces()),
+        ));
     }
-    text += &format!("{:?} {:?} ", batch.all_hits(), batch.count_hits());
-    let mut visited = vec![0; rays.len()];
+    found.push((
+        "lists",
+        format!("{:?} {:?}", batch.all_hits(), batch.count_hits()),
+    ));
+    let mut visited = vec![0u32; rays.len()];
     batch.visit_hits(&mut visited, |visited, hit| {
-        *visited = 31 * *visited + hit.prim_id % 1000;
+        *visited = visited.wrapping_mul(31).wrapping_add(hit.prim_id);
         Visit::Reject
     });
+    found.push(("visits", format!("{visited:?}")));
     for ((ray, time), id) in rays.iter().zip(times).zip(&ids).step_by(5) {
         let query = bvh.query(ray).at(*time);
-        text += &format!("{:?} {} ", query.intersect(), query.occluded());
+        found.push((
+            "query",
+            format!("{:?} {}", query.intersect(), query.occluded()),
+        ));
         let query = query.mask(1).except(*id);
-        text += &format!("{:?} {} ", query.all_hits(), query.occluded());
+        found.push((
+            "masked query",
+            format!("{:?} {}", query.all_hits(), query.occluded()),
+        ));
     }
-    let sky = Directions::new(&rays.iter().map(|ray| ray.dir).take(70).collect::<Vec<_>>());
+    let directions: Vec<_> = rays.iter().map(|ray| ray.dir).take(70).collect();
+    let sky = Directions::new(&directions);
     let group = bvh.group(points, &sky);
     let mut open = vec![0; points.len() * group.words_per_row()];
     group.open_into(&mut open);
-    let near = bvh.points(points).closest();
-    text + &format!("{visited:?} {open:?} {near:?}")
+    found.push(("group", format!("{open:?}")));
+    found.push(("points", format!("{:?}", bvh.points(points).closest())));
+    found
 }
 
 #[test]
@@ -86,7 +106,9 @@ fn every_engine_answers_every_query() {
         let expected = answers(&tree(Engine::default()), &rays, &points, &times);
         for engine in engines() {
             let found = answers(&tree(engine), &rays, &points, &times);
-            assert!(found == expected, "{engine:?}");
+            for ((kind, found), (_, expected)) in found.iter().zip(&expected) {
+                assert!(found == expected, "{engine:?} {kind}:\n{found}\n{expected}");
+            }
         }
     }
 }
