@@ -276,7 +276,7 @@ int main(int argc, char **argv) {
             fill(placed[index].transform, 12);
         }
         OK(antumbra_recipe_init(&recipe, presets[below(4)]));
-        recipe.width = below(20) ? 8 : below(20);
+        recipe.width = below(20) ? 0 : below(20);
         recipe.level = below(4) ? NULL : "scalar";
         recipe.training = below(4) - 1;
         recipe.surface_rays = below(200);

@@ -174,6 +174,8 @@ int main(int argc, char **argv) {
     instances[3].object = 1;
     OK(antumbra_world_set_instances(world, instances, INSTANCES, NULL));
     same_hits(fixed, tree, rays);
+    /* The only level with several widths. */
+    recipe.level = "scalar";
     recipe.width = 4;
     options.recipe = &recipe;
     OK(antumbra_object_build(scenes[0], &options, &narrow));

@@ -140,7 +140,7 @@ int main(int argc, char **argv) {
     float last = 0;
     std::mutex mutex;
     antumbra::Recipe recipe("fast");
-    recipe.order("sort+").width(8);
+    recipe.order("sort+").level("scalar").width(8);
     antumbra::Bvh bvh(scene, antumbra::Build().recipe(recipe).rays(rays).threads(threads).progress([&](float done) {
         std::lock_guard<std::mutex> guard(mutex);
         last = std::max(last, done);

@@ -152,7 +152,10 @@ proptest! {
             check(&loaded, &scene, &mut rng, &format!("seed {seed} loaded, step {step}"));
             loaded.validate().expect("promises are kept");
             for object in 0..scene.objects.len() as u32 {
-                prop_assert_eq!(loaded.quality(object), world.quality(object));
+                let [loaded, world] = [&loaded, &world].map(|world| world.quality(object));
+                // Other nodes grow by another factor.
+                let most = if is_as_saved { 0.0 } else { 0.05 * world };
+                prop_assert!((loaded - world).abs() <= most, "{} and {}", loaded, world);
             }
             prop_assert_eq!(loaded.bounds(), world.bounds());
         }
