@@ -84,7 +84,7 @@ fn world(scene: &Scene, width: Width) -> (World, Object) {
     let recipe = learned(Recipe::default(), width);
     let object = |geometries| Object::build(geometries, &recipe).expect(SOUND);
     let mut objects: Vec<_> = scene.objects.iter().map(object).collect();
-    let world = World::on_ground(&object(&scene.world), &objects, &scene.instances);
+    let world = World::on_ground(object(&scene.world), &objects, &scene.instances);
     (world.expect(SOUND), objects.swap_remove(0))
 }
 

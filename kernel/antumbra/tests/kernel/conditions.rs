@@ -312,8 +312,8 @@ fn masks_of_a_world_stay() {
     };
     let objects = [object(1.0), object(2.0)];
     let place = |object: u32, x: f32| Instance::new(object, translation([x, 0.0, 0.0]));
-    let mut world = World::on_ground(&object(3.0), &objects, &[place(0, 0.0), place(1, 0.0)])
-        .expect("in range");
+    let mut world =
+        World::on_ground(object(3.0), &objects, &[place(0, 0.0), place(1, 0.0)]).expect("in range");
     let masks = Masks::new()
         .world(vec![0b001])
         .objects(vec![vec![0b010], vec![0b100]])

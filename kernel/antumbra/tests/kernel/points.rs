@@ -124,7 +124,7 @@ proptest! {
         let recipe = Recipe::default();
         let build = |list: &[Geometry<'_>]| antumbra::Object::build(list, &recipe).expect("in range");
         let objects: Vec<_> = scene.object_lists().iter().map(|list| build(list)).collect();
-        let world = World::on_ground(&build(&scene.ground()), &objects, &scene.instances).expect("in range");
+        let world = World::on_ground(build(&scene.ground()), &objects, &scene.instances).expect("in range");
         let brute = Brute::new(&scene.primitives());
         let points = points(&mut rng, &brute, 40);
         check(&world, &brute, &points, &mut rng, &format!("seed {seed}"));

@@ -37,7 +37,7 @@ fn build_objects(scene: &Scene, recipe: &Recipe) -> Vec<Arc<Object>> {
 fn check(world: &World, scene: &Scene, rng: &mut Rng, place: &str) {
     let rays = scene.rays(rng, 100);
     let expected = Expected::new(&scene.primitives(), &rays, place);
-    expected.check(&world, &rays, place);
+    expected.check(world, &rays, place);
 }
 
 /// Reads a file of a scene, all shapes of which are the same.
@@ -305,7 +305,7 @@ fn a_large_ground_moves() {
     let sheet = square(0.1);
     let object = build(&[geometry(&sheet)], &recipe);
     let instances = [Instance::new(0, IDENTITY)];
-    let mut world = World::on_ground(&build(&[ground(&mesh)], &recipe), &[&object], &instances)
+    let mut world = World::on_ground(build(&[ground(&mesh)], &recipe), &[&object], &instances)
         .expect("objects in range");
     for position in &mut mesh.positions {
         position[2] = 0.5 - 2.0 * position[2];

@@ -103,7 +103,7 @@ impl Scene {
     fn world(&self, recipe: &Recipe) -> World {
         let build = |list: &[Geometry<'_>]| Object::build(list, recipe).expect("in range");
         let objects = self.objects().map(|list| build(&list));
-        World::on_ground(&build(&self.ground()), &objects, &self.instances).expect("in range")
+        World::on_ground(build(&self.ground()), &objects, &self.instances).expect("in range")
     }
 
     /// Reads a file of the scene: it says which functions it wants.
