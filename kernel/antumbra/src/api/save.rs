@@ -113,7 +113,7 @@ impl Bvh {
     }
 
     /// Reads a tree that [`Bvh::write`] wrote, for the best instruction set of this CPU. A tree of a width that this does not
-    /// have is collapsed again, with the leaves in the order that was learned; [`BuildReport::file_width`] says so. Takes no byte
+    /// have is collapsed again, with the leaves in the order that was learned; [`file_width`](crate::BuildReport::file_width) says so. Takes no byte
     /// behind its end. Give any reader, buffered or not.
     ///
     /// Files are not trusted. A wrong checksum is an error, and so is a file with a right one whose tree would let a query

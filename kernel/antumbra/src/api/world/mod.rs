@@ -103,7 +103,7 @@ impl World {
     ///
     /// # Errors
     /// An index of an object out of range; more instances, nodes or leaves than can be numbered; objects of different
-    /// [widths](crate::Recipe::width); [`Error::Moves`] for an instance that moves while rays are traced.
+    /// [widths](crate::recipe::Engine::width); [`Error::Moves`] for an instance that moves while rays are traced.
     pub fn new(objects: &[impl AsRef<Object>], instances: &[Instance]) -> Result<Self, Error> {
         Self::put_together(None, objects, instances)
     }
