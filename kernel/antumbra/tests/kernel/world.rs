@@ -154,8 +154,7 @@ proptest! {
             for object in 0..scene.objects.len() as u32 {
                 let [loaded, world] = [&loaded, &world].map(|world| world.quality(object));
                 // Other nodes grow by another factor.
-                let most = if is_as_saved { 0.0 } else { 0.05 * world };
-                prop_assert!((loaded - world).abs() <= most, "{} and {}", loaded, world);
+                prop_assert!(!is_as_saved || loaded == world, "{} and {}", loaded, world);
             }
             prop_assert_eq!(loaded.bounds(), world.bounds());
         }
