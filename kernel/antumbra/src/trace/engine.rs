@@ -354,7 +354,7 @@ impl<S: Simd + Lanes<N>, const N: usize> Table for Compiled<S, N> {
     }
 
     fn width(&self) -> Width {
-        const { Width::of_lanes(N) }
+        const { Width::from_lanes(N).expect("nodes have 4, 8 or 16 children") }
     }
 
     fn observe(

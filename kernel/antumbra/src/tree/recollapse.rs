@@ -93,17 +93,14 @@ impl Tree {
                 .map_or(0, |pair| pair.0);
             let pair = [items.remove(smallest), items.remove(smallest)];
             let bounds = pair[0].bounds.union(&pair[1].bounds);
-            let fits = pair
-                .iter()
-                .map(|item| item.below.len().max(1))
-                .sum::<usize>()
-                <= width;
-            let parts =
-                pair.into_iter()
-                    .flat_map(|mut item| match fits && !item.below.is_empty() {
-                        true => core::mem::take(&mut item.below),
-                        false => vec![item],
-                    });
+            let sizes = pair.iter().map(|item| item.below.len().max(1));
+            let fits = sizes.sum::<usize>() <= width;
+            let parts = pair
+                .into_iter()
+                .flat_map(|item| match fits && !item.below.is_empty() {
+                    true => item.below,
+                    false => vec![item],
+                });
             let merged = Item {
                 child: Child::EMPTY,
                 bounds,

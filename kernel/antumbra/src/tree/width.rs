@@ -31,16 +31,12 @@ impl Width {
     }
 
     /// The width with so many children per node; `None` unless that is 4, 8 or 16.
-    pub fn from_lanes(lanes: usize) -> Option<Self> {
-        Self::ALL.into_iter().find(|width| width.lanes() == lanes)
-    }
-
-    /// The width with so many children per node, which is known to be 4, 8 or 16.
-    pub(crate) const fn of_lanes(lanes: usize) -> Self {
+    pub const fn from_lanes(lanes: usize) -> Option<Self> {
         match lanes {
-            4 => Self::W4,
-            8 => Self::W8,
-            _ => Self::W16,
+            4 => Some(Self::W4),
+            8 => Some(Self::W8),
+            16 => Some(Self::W16),
+            _ => None,
         }
     }
 

@@ -57,30 +57,28 @@ fn answers_have_the_known_check_sums() {
     let segments: Vec<Ray> = rays.iter().map(|ray| Ray { tfar: 1.0, ..*ray }).collect();
     let geometry = [Geometry::triangles(positions, indices)];
     for engine in Engine::all() {
-        {
-            let recipe = Recipe::default().engine(engine);
-            let bvh = Bvh::build(&geometry, &recipe).expect("in range");
-            let mut occluded = vec![false; rays.len()];
-            bvh.batch(&segments).closed().occluded_into(&mut occluded);
-            let mut hits = vec![None; rays.len()];
-            bvh.batch(&rays).closed().intersect_into(&mut hits);
-            let sums = [
-                check_sum(occluded.iter().map(|&occluded| u8::from(occluded))),
-                check_sum(
-                    hits.iter()
-                        .flat_map(|hit| hit.map_or(f32::INFINITY, |hit| hit.t).to_le_bytes()),
-                ),
-                check_sum(
-                    hits.iter()
-                        .flat_map(|hit| hit.map_or(INVALID_ID, |hit| hit.prim_id).to_le_bytes()),
-                ),
-                check_sum(hits.iter().flat_map(|hit| {
-                    hit.map_or([0.0; 2], |hit| [hit.u, hit.v])
-                        .into_iter()
-                        .flat_map(f32::to_le_bytes)
-                })),
-            ];
-            assert_eq!(sums, KNOWN, "{engine:?}: {sums:#x?}");
-        }
+        let recipe = Recipe::default().engine(engine);
+        let bvh = Bvh::build(&geometry, &recipe).expect("in range");
+        let mut occluded = vec![false; rays.len()];
+        bvh.batch(&segments).closed().occluded_into(&mut occluded);
+        let mut hits = vec![None; rays.len()];
+        bvh.batch(&rays).closed().intersect_into(&mut hits);
+        let sums = [
+            check_sum(occluded.iter().map(|&occluded| u8::from(occluded))),
+            check_sum(
+                hits.iter()
+                    .flat_map(|hit| hit.map_or(f32::INFINITY, |hit| hit.t).to_le_bytes()),
+            ),
+            check_sum(
+                hits.iter()
+                    .flat_map(|hit| hit.map_or(INVALID_ID, |hit| hit.prim_id).to_le_bytes()),
+            ),
+            check_sum(hits.iter().flat_map(|hit| {
+                hit.map_or([0.0; 2], |hit| [hit.u, hit.v])
+                    .into_iter()
+                    .flat_map(f32::to_le_bytes)
+            })),
+        ];
+        assert_eq!(sums, KNOWN, "{engine:?}: {sums:#x?}");
     }
 }

@@ -144,8 +144,7 @@ impl World {
             object.built_sah = object.built_sah.map(|built| built * now / before);
         }
         (self.top_nodes, self.top_room) = (1, 1);
-        let instances = core::mem::take(&mut self.instances);
-        self.instances.clone_from(&instances);
+        let instances = self.instances.clone();
         self.place(&instances)?;
         Ok(self)
     }

@@ -231,7 +231,7 @@ fn kept_widths() -> Vec<Width> {
 
 /// Trees of widths that are none of this CPU's come back in another, with the same answers in the same order of leaves.
 #[test]
-fn trees_of_other_widths_are_collapsed_anew() {
+fn trees_of_other_widths_are_collapsed_again() {
     let same = |read: &Bvh, built: &Bvh, rays: &[Ray], place: &str| {
         read.validate().expect("a sound tree");
         let best = Engine::default();
