@@ -2,19 +2,20 @@
 
 use std::collections::HashMap;
 
-use antumbra::{Bvh, Ray};
+use antumbra::{Bvh, Ray, Visit};
 use rayon::prelude::*;
 
-use crate::normals::{cross, unit};
+use crate::normals::unit;
 use crate::orientation::dot;
-use crate::visibility::above;
+use crate::surfaces::Flat;
+use crate::visibility::{above, origin_offset};
 use crate::{Mesh, Orientation, Sensors, Surface};
 
 /// Sides of the compass, clockwise from north.
 const SIDES: [&str; 8] = ["N", "NE", "E", "SE", "S", "SW", "W", "NW"];
 
 /// Least cosine between the normals of a sensor and of the triangle that it is on.
-const FACING: f32 = 0.7;
+const FACING: f64 = 0.7;
 
 /// Groups of the triangles of a mesh. Each triangle is in one group.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,7 +56,8 @@ impl Groups {
                     group
                 }
             };
-            let area = 0.5 * length(twice(mesh, *corners));
+            let normal = mesh.twice(*corners);
+            let area = 0.5 * dot(normal, normal).sqrt();
             if area.is_finite() {
                 groups.areas[group as usize] += area;
             }
@@ -111,61 +113,15 @@ impl Statistics {
     };
 }
 
-/// Normal of a triangle times twice its area.
-fn twice(mesh: &Mesh, corners: [u32; 3]) -> [f64; 3] {
-    let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize].map(f64::from));
-    let minus = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|axis| a[axis] - b[axis]);
-    cross(minus(b, a), minus(c, a))
-}
-
-fn length(vector: [f64; 3]) -> f64 {
-    dot(vector, vector).sqrt()
-}
-
 impl Mesh {
-    /// Connected bodies: triangles that have a corner at the same place belong to one body. Number of the body of each triangle, from
-    /// 0 in the order of the first triangles.
-    pub fn bodies(&self) -> Vec<u32> {
-        let mut root: Vec<u32> = (0..self.indices.len() as u32).collect();
-        fn find(root: &mut [u32], mut at: u32) -> u32 {
-            while root[at as usize] != at {
-                let next = root[root[at as usize] as usize];
-                root[at as usize] = next;
-                at = next;
-            }
-            at
-        }
-        let mut first: HashMap<[u32; 3], u32> = HashMap::new();
-        for (triangle, corners) in (0..).zip(&self.indices) {
-            for &corner in corners {
-                // 0 and -0 are the same place.
-                let place = self.positions[corner as usize].map(|x| (x + 0.0).to_bits());
-                let other = *first.entry(place).or_insert(triangle);
-                let [a, b] = [find(&mut root, other), find(&mut root, triangle)];
-                // The smaller number stays, so that roots are first triangles.
-                root[a.max(b) as usize] = a.min(b);
-            }
-        }
-        let mut numbers = HashMap::new();
-        (0..self.indices.len() as u32)
-            .map(|triangle| {
-                let next = numbers.len() as u32;
-                *numbers.entry(find(&mut root, triangle)).or_insert(next)
-            })
-            .collect()
-    }
-
     /// Side of each triangle: for a facade the side of the compass to which it faces, within 22.5 degrees, as `N`, `NE` and so on;
-    /// `roof`, `ground` or `underside` for other [surfaces](Surface). Empty for a triangle without area. Triangles face as their
-    /// corners run anticlockwise.
-    pub fn sides(&self, bvh: &Bvh, orientation: &Orientation) -> Vec<&'static str> {
-        let side = |corners: &[u32; 3]| {
-            let Some(normal) = unit(twice(self, *corners)) else {
+    /// the name of the kind for other [surfaces](Surface). Empty for a triangle without area.
+    pub fn sides(&self, kinds: &[Surface], orientation: &Orientation) -> Vec<&'static str> {
+        let side = |(&corners, kind): (&[u32; 3], &Surface)| {
+            let Some(normal) = unit(self.twice(corners)) else {
                 return "";
             };
-            let all = corners.map(|corner| self.positions[corner as usize].map(f64::from));
-            let middle = [0, 1, 2].map(|axis| all.iter().map(|p| p[axis]).sum::<f64>() / 3.0);
-            match Surface::of(bvh, middle, normal, orientation) {
+            match kind {
                 Surface::Facade => {
                     let [east, north, _] = orientation.local(normal);
                     let azimuth = libm::atan2(east, north).to_degrees().rem_euclid(360.0);
@@ -174,32 +130,58 @@ impl Mesh {
                 other => other.name(),
             }
         };
-        self.indices.par_iter().map(side).collect()
+        self.indices.iter().zip(kinds).map(side).collect()
     }
 }
 
 impl Sensors {
-    /// The triangle that each sensor is on, as shape and triangle of the tree: the first one behind the sensor, against its normal, or
-    /// below it for a sensor without one. `None` where there is none, or where it faces elsewhere than the sensor.
-    pub fn triangles(&self, bvh: &Bvh, orientation: &Orientation) -> Vec<Option<[u32; 2]>> {
+    /// Triangle of the mesh that each point of a table is on, and how many points are ambiguous. Sensors that were made on a
+    /// triangle know it without a search.
+    ///
+    /// A point is on the first surface behind it, against its normal, or below it for a point without one. Of surfaces that touch,
+    /// it is on the one that faces as its normal does, and `None` if the first surface does not. A point is ambiguous where
+    /// surfaces of two groups do; `group` says to which one a triangle belongs.
+    pub fn locate(
+        &self,
+        (bvh, flat): (&Bvh, Flat<'_>),
+        mesh: &Mesh,
+        group: &(dyn Fn(u32) -> u32 + Sync),
+        orientation: &Orientation,
+    ) -> (Vec<Option<u32>>, usize) {
         let bounds = bvh.bounds();
-        let rays = self.points.iter().enumerate().map(|(index, point)| {
+        let locate = |index: usize| {
+            let point = &self.points[index];
             let normal = self.normals.get(index).map(|normal| normal.map(f64::from));
             let normal = unit(normal.unwrap_or(orientation.up)).unwrap_or([f64::NAN; 3]);
-            Ray::new(above(&bounds, point, normal), normal.map(|x| -x as f32))
-        });
-        let rays: Vec<Ray> = rays.collect();
-        let hits = bvh.batch(&rays).intersect();
-        let found = rays.iter().zip(hits).map(|(ray, hit)| {
-            let hit = hit?;
-            // A ray that leaves by a gap of its own surface hits another one at a slant.
-            let normal = bvh.normal(ray, &hit)?;
-            let slant: f32 = normal.iter().zip(ray.dir).map(|(a, b)| a * b).sum();
-            let is_own = self.normals.is_empty()
-                || slant.abs() > FACING * length(ray.dir.map(f64::from)) as f32;
-            is_own.then_some([hit.geom_id, hit.prim_id])
-        });
-        found.collect()
+            let ray = Ray::new(above(&bounds, point, normal), normal.map(|x| -x as f32));
+            let offset = origin_offset(&bounds, *point);
+            let (mut end, mut own, mut is_ambiguous) = (f32::INFINITY, None, false);
+            bvh.query(&ray).visit_hits(|hit| {
+                end = end.min(hit.t + offset);
+                if hit.t > end {
+                    return Visit::Stop;
+                }
+                let triangle = flat([hit.geom_id, hit.prim_id]).filter(|&triangle| {
+                    let front = unit(mesh.twice(mesh.indices[triangle as usize]));
+                    // A ray that leaves by a gap of its own surface hits another one at a slant.
+                    let cosine = front.map_or(0.0, |front| dot(front, normal));
+                    self.normals.is_empty() || cosine > FACING
+                });
+                if let Some(triangle) = triangle {
+                    let own = *own.get_or_insert(triangle);
+                    is_ambiguous |= group(own) != group(triangle);
+                }
+                Visit::Reject
+            });
+            (own, is_ambiguous)
+        };
+        let found: Vec<(Option<u32>, bool)> =
+            (0..self.points.len()).into_par_iter().map(locate).collect();
+        let ambiguous = found
+            .iter()
+            .filter(|(_, is_ambiguous)| *is_ambiguous)
+            .count();
+        (found.into_iter().map(|(own, _)| own).collect(), ambiguous)
     }
 }
 
@@ -208,7 +190,7 @@ mod tests {
     use antumbra::{Geometry, Recipe};
 
     use super::*;
-    use crate::Placement;
+    use crate::{Placement, Surfaces};
 
     /// Two boxes of 10 x 20 x 6 and 4 x 4 x 9 without floors, on a ground.
     fn village() -> (Bvh, Mesh) {
@@ -240,9 +222,12 @@ mod tests {
 
     #[test]
     fn facades_have_their_areas_sides_and_sensors() {
-        let (bvh, mesh) = village();
+        let (bvh, mut mesh) = village();
         let plan = Orientation::default();
-        let (bodies, sides) = (mesh.bodies(), mesh.sides(&bvh, &plan));
+        let bodies = mesh.bodies();
+        let flat = |[_, triangle]: [u32; 2]| Some(triangle);
+        let surfaces = Surfaces::new(&mut mesh, &bodies, (&bvh, &flat), &plan);
+        let sides = mesh.sides(&surfaces.kinds, &plan);
         let groups = Groups::new(&mesh, vec!["object", "facade"], |triangle| {
             vec![bodies[triangle].to_string(), sides[triangle].to_owned()]
         });
@@ -268,12 +253,24 @@ mod tests {
             kinds: Surface::ALL.to_vec(),
             offset: 0.1,
             storey: None,
+            covered: 0.5,
         };
-        let sensors = Sensors::on_surfaces(&bvh, &mesh, &placement, &plan).expect("sensors");
-        let triangles = sensors.triangles(&bvh, &plan);
-        let flat: Vec<Option<u32>> = triangles.iter().map(|ids| ids.map(|ids| ids[1])).collect();
+        let all = 0..mesh.indices.len() as u32;
+        let sensors = Sensors::on_surfaces(&bvh, &flat, (&mesh, &surfaces), all, &placement, &plan);
+        let sensors = sensors.expect("sensors");
+        let triangles: Vec<Option<u32>> = sensors.triangles.iter().copied().map(Some).collect();
+        let group = |triangle: u32| groups.of_triangle[triangle as usize];
+        let located = sensors.locate((&bvh, &flat), &mesh, &group, &plan);
+        assert_eq!(located.1, 0);
+        for (found, made) in located.0.iter().zip(&sensors.triangles) {
+            assert_eq!(
+                found.map(group),
+                Some(group(*made)),
+                "found where they were made"
+            );
+        }
         let heights: Vec<f64> = sensors.points.iter().map(|p| f64::from(p[2])).collect();
-        let found = groups.statistics(&flat, &heights);
+        let found = groups.statistics(&triangles, &heights);
         for (found, area) in found.iter().zip(&groups.areas) {
             assert_eq!(found.count as f64, *area, "a sensor for each square metre");
         }
@@ -288,26 +285,16 @@ mod tests {
 
     #[test]
     fn north_turns_the_sides() {
-        let (bvh, mesh) = village();
+        let (bvh, mut mesh) = village();
         // The x axis points north.
         let plan = Orientation::new(crate::UpAxis::Z, 90.0).expect("a plan");
-        let sides = mesh.sides(&bvh, &plan);
+        let objects = mesh.bodies();
+        let flat = |[_, triangle]: [u32; 2]| Some(triangle);
+        let surfaces = Surfaces::new(&mut mesh, &objects, (&bvh, &flat), &plan);
+        let sides = mesh.sides(&surfaces.kinds, &plan);
         assert_eq!(
             [sides[0], sides[2], sides[4], sides[6]],
             ["E", "N", "W", "S"]
         );
-    }
-
-    #[test]
-    fn bodies_are_joined_however_their_triangles_are_sorted() {
-        let at = |i: u32| [i as f32, 0.0, 0.0];
-        // A chain whose links come in the wrong order, and a triangle beside it.
-        let mesh = Mesh {
-            positions: (0..12).map(at).collect(),
-            indices: vec![[4, 5, 6], [0, 1, 2], [9, 10, 11], [2, 3, 4]],
-            ..Mesh::default()
-        };
-        assert_eq!(mesh.bodies(), [0, 0, 1, 0]);
-        assert!(Mesh::default().bodies().is_empty());
     }
 }

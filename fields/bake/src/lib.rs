@@ -69,6 +69,7 @@
 //! - `job`: jobs and their keys;  `work`, `part`: chunks of a job, and files of them;  `learn`: trees that learn from a job
 //! - `occlusion_job`, `sunlight`, `visibility_job`: one job each
 //! - `mesh`, `sensors`, `table`, `atlas`: points that are baked
+//! - `bodies`: what is closed, and which way it faces;  `surfaces`: roofs, facades and ground, and what is covered
 //! - `groups`: triangles of an object, a material or a facade, and means over their sensors
 //! - `placement`: sensors on roofs, facades and ground, and along lines
 //! - `ambient_occlusion`: the open part of the sky above points
@@ -91,6 +92,7 @@
 mod ambient_occlusion;
 mod atlas;
 mod bits;
+mod bodies;
 mod clock;
 mod creases;
 mod curvature;
@@ -125,6 +127,7 @@ mod sensors;
 mod sky;
 mod sun;
 mod sunlight;
+mod surfaces;
 mod sweep;
 mod table;
 mod view_factors;
@@ -138,6 +141,7 @@ pub use ambient_occlusion::{
 };
 pub use atlas::Atlas;
 pub use bits::{BitMatrix, ones};
+pub use bodies::Bodies;
 pub use clock::Clock;
 pub use creases::{CREASE_ANGLE, Creased, inside_edges, split_at_creases};
 pub use curvature::{Curvature, EARTH_RADIUS, REFRACTION};
@@ -164,12 +168,13 @@ pub use occlusion_job::{OcclusionJob, Openness};
 pub use orientation::{Orientation, UpAxis};
 pub use part::{Identity, Part};
 pub use perez::{Irradiance, perez_sky};
-pub use placement::{Placement, Surface};
+pub use placement::Placement;
 pub use ply::ShadedMesh;
 pub use sensors::{Grid, Label, Layout, Sensors};
 pub use sky::{SkyDivision, SkyPatches};
 pub use sun::{Place, Refraction, SunPosition, sun_positions};
 pub use sunlight::{SunFound, SunJob, SunValues, Sunlight, Suns, TimeStep};
+pub use surfaces::{Flat, Surface, Surfaces};
 pub use table::BadTable;
 pub use view_factors::{ViewFactorJob, view_factors};
 pub use viewshed::{Observer, ViewshedJob, Viewsheds};

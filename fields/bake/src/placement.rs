@@ -4,59 +4,8 @@ use antumbra::{Bvh, Ray};
 
 use crate::normals::{cross, unit};
 use crate::orientation::dot;
-use crate::visibility::above;
-use crate::{Error, Label, Layout, Mesh, Orientation, Sensors, memory};
-
-/// Kind of a surface, by its slope and by what is below.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Surface {
-    /// Faces up, within 60 degrees, with a surface below.
-    Roof,
-    /// Faces up, within 60 degrees, with nothing below: terrain and streets.
-    Ground,
-    /// Faces sideways: more than 60 degrees from up and from down.
-    Facade,
-    /// Faces down, within 60 degrees.
-    Underside,
-}
-
-impl Surface {
-    /// All kinds.
-    pub const ALL: [Self; 4] = [Self::Roof, Self::Ground, Self::Facade, Self::Underside];
-
-    /// Name in tables and on command lines.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Roof => "roof",
-            Self::Ground => "ground",
-            Self::Facade => "facade",
-            Self::Underside => "underside",
-        }
-    }
-
-    /// Kind of the surface at a point with a normal of length 1.
-    pub(crate) fn of(
-        bvh: &Bvh,
-        point: [f64; 3],
-        normal: [f64; 3],
-        orientation: &Orientation,
-    ) -> Self {
-        let steepness = dot(normal, orientation.up);
-        if steepness.abs() < STEEP {
-            return Self::Facade;
-        }
-        if steepness < 0.0 {
-            return Self::Underside;
-        }
-        let below = normal.map(|x| -x);
-        let start = above(&bvh.bounds(), &point.map(|x| x as f32), below);
-        let down = normal.map(|x| -x as f32);
-        match bvh.occluded(&Ray::new(start, down)) {
-            true => Self::Roof,
-            false => Self::Ground,
-        }
-    }
-}
+use crate::surfaces::Flat;
+use crate::{Error, Label, Mesh, Orientation, Sensors, Surface, Surfaces, memory};
 
 /// How sensors are placed on surfaces.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,19 +18,23 @@ pub struct Placement {
     pub offset: f64,
     /// Height of a storey; `None` for no storeys.
     pub storey: Option<f64>,
+    /// Distance to the first surface above within which a place that sees no sky is [covered](Surfaces::covered).
+    pub covered: f64,
 }
 
-/// Cosine of 60 degrees.
-const STEEP: f64 = 0.5;
+/// Distance from an edge, over the spacing, within which a point is on it.
+const ON_EDGE: f64 = 1e-4;
 
 /// Most sensors of a triangle, beyond which the spacing is a mistake.
 const MOST_CELLS: f64 = 1e8;
 
 impl Sensors {
-    /// Sensors on the triangles of a mesh, which face as their corners run anticlockwise.
+    /// Sensors on some triangles of a mesh, whose front they see.
     ///
     /// Every plane has a lattice of points of its own, `spacing` apart, level and upright; triangles of the plane share it. Points
     /// inside of a triangle are sensors. So each stands for the same area, and a surface smaller than a square may have none.
+    /// Places that are [covered](Surfaces::covered) have sensors only if that is one of the kinds; otherwise they are listed in
+    /// [`Sensors::covered`].
     /// Labels are the kind of the [`Surface`] as `surface`, and with storeys, for facades, `storey`: their height above the surface
     /// below, just outside, over the height of a storey, rounded down. Storeys are counted from 0.
     ///
@@ -90,7 +43,9 @@ impl Sensors {
     /// than 100 million points, [`Error::NoSurface`] if there is no sensor.
     pub fn on_surfaces(
         bvh: &Bvh,
-        mesh: &Mesh,
+        flat: Flat<'_>,
+        (mesh, surfaces): (&Mesh, &Surfaces),
+        triangles: impl IntoIterator<Item = u32>,
         placement: &Placement,
         orientation: &Orientation,
     ) -> Result<Self, Error> {
@@ -104,48 +59,58 @@ impl Sensors {
                 });
             }
         }
-        let mut sensors = Self {
-            points: Vec::new(),
-            normals: Vec::new(),
-            labels: Vec::new(),
-            layout: Layout::List,
-        };
-        let (mut surfaces, mut storeys) = (Vec::new(), Vec::new());
+        let of_kind = |kind| placement.kinds.contains(&kind);
+        let mut places: Vec<([f64; 3], u32)> = Vec::new();
         let mut found = Vec::new();
-        for corners in &mesh.indices {
+        for triangle in triangles {
+            if !of_kind(surfaces.kinds[triangle as usize]) && !of_kind(Surface::Covered) {
+                continue;
+            }
+            let corners = mesh.indices[triangle as usize];
             let corners = corners.map(|corner| mesh.positions[corner as usize].map(f64::from));
-            let Some(plane) = Plane::new(corners, orientation) else {
+            if let Some(plane) = Plane::new(corners, orientation) {
+                found.clear();
+                plane.lattice(corners, placement.spacing, &mut found)?;
+                memory::grow(&mut places, "sensors", found.len())?;
+                places.extend(found.iter().map(|&point| (point, triangle)));
+            }
+        }
+        let are_covered = surfaces.covered((bvh, flat), mesh, &places, placement.covered);
+        let mut sensors = Self::default();
+        let (mut names, mut storeys) = (Vec::new(), Vec::new());
+        for (&(point, triangle), is_covered) in places.iter().zip(are_covered) {
+            let on = surfaces.kinds[triangle as usize];
+            let kind = if is_covered { Surface::Covered } else { on };
+            if !of_kind(kind) {
+                if is_covered {
+                    sensors.covered.push(triangle);
+                }
+                continue;
+            }
+            let Some(normal) = unit(mesh.twice(mesh.indices[triangle as usize])) else {
                 continue;
             };
-            found.clear();
-            plane.lattice(corners, placement.spacing, &mut found)?;
-            memory::grow(&mut sensors.points, "sensors", found.len())?;
-            for &point in &found {
-                let kind = Surface::of(bvh, point, plane.normal, orientation);
-                if !placement.kinds.contains(&kind) {
-                    continue;
-                }
-                let height = |storey: f64| {
-                    let outside = along(point, plane.normal, 0.1 * storey);
+            names.push(kind.name().to_owned());
+            if let Some(storey) = placement.storey {
+                let height = || {
+                    let outside = along(point, normal, 0.1 * storey);
                     let ray =
                         Ray::new(outside.map(|x| x as f32), orientation.up.map(|x| -x as f32));
                     let ground = bvh.intersect(&ray).map(|hit| f64::from(hit.t));
                     ground.map(|height| ((height + 1e-6 * storey) / storey).floor())
                 };
-                surfaces.push(kind.name().to_owned());
-                if let Some(storey) = placement.storey {
-                    let number = (kind == Surface::Facade).then(|| height(storey)).flatten();
-                    storeys.push(number.map_or(String::new(), |number| number.to_string()));
-                }
-                let moved = along(point, plane.normal, placement.offset);
-                sensors.points.push(moved.map(|x| x as f32));
-                sensors.normals.push(plane.normal.map(|x| x as f32));
+                let number = (on == Surface::Facade).then(height).flatten();
+                storeys.push(number.map_or(String::new(), |number| number.to_string()));
             }
+            let moved = along(point, normal, placement.offset);
+            sensors.points.push(moved.map(|x| x as f32));
+            sensors.normals.push(normal.map(|x| x as f32));
+            sensors.triangles.push(triangle);
         }
         if sensors.points.is_empty() {
             return Err(Error::NoSurface);
         }
-        sensors.labels.push(Label::new("surface", surfaces));
+        sensors.labels.push(Label::new("surface", names));
         if placement.storey.is_some() {
             sensors.labels.push(Label::new("storey", storeys));
         }
@@ -166,12 +131,7 @@ impl Sensors {
                 wanted: "a length above 0",
             });
         }
-        let mut sensors = Self {
-            points: Vec::new(),
-            normals: Vec::new(),
-            labels: Vec::new(),
-            layout: Layout::List,
-        };
+        let mut sensors = Self::default();
         let names = corners.labels.first();
         let mut all_names = Vec::new();
         // Length from the last sensor, which is half a step before the start of a line.
@@ -212,7 +172,6 @@ impl Sensors {
 
 /// Plane of a triangle, with axes in it that are the same for all triangles of the plane.
 struct Plane {
-    normal: [f64; 3],
     axes: [[f64; 3]; 2],
 }
 
@@ -229,7 +188,6 @@ impl Plane {
         };
         let other = unit(cross(rounded, right))?;
         Some(Self {
-            normal,
             axes: [right, other],
         })
     }
@@ -258,10 +216,11 @@ impl Plane {
                 let at = [ends[0][0] + column as f64, ends[1][0] + row as f64].map(|x| x + 0.5);
                 let inside = (0..3).all(|side| {
                     let (from, to) = (flat[side], flat[(side + 1) % 3]);
-                    let part = edge(from, to, at) * area.signum();
-                    // Points on an edge belong to the triangle on one side of it.
-                    let is_first = (from[0], from[1]) < (to[0], to[1]);
-                    part > 0.0 || part == 0.0 && is_first
+                    let [right, up] = [0, 1].map(|axis| to[axis] - from[axis]);
+                    let apart = edge(from, to, at) * area.signum() / libm::hypot(right, up);
+                    // Points on an edge belong to the triangle on one side of it. Edges are rounded.
+                    let is_first = right > ON_EDGE || right > -ON_EDGE && up > 0.0;
+                    apart > ON_EDGE || apart >= -ON_EDGE && is_first
                 });
                 if inside {
                     let weights = [1, 2, 0]
@@ -321,22 +280,36 @@ mod tests {
     }
 
     fn on(kinds: &[Surface]) -> Result<Sensors, Error> {
-        let (bvh, mesh) = house();
+        let (bvh, mut mesh) = house();
+        let plan = Orientation::default();
+        let objects = vec![0; mesh.indices.len()];
+        let flat = |[_, triangle]: [u32; 2]| Some(triangle);
+        let surfaces = Surfaces::new(&mut mesh, &objects, (&bvh, &flat), &plan);
         let placement = Placement {
             spacing: 2.0,
             kinds: kinds.to_vec(),
             offset: 0.25,
             storey: Some(3.0),
+            covered: 0.5,
         };
-        Sensors::on_surfaces(&bvh, &mesh, &placement, &Orientation::default())
+        let triangles = 0..mesh.indices.len() as u32;
+        Sensors::on_surfaces(
+            &bvh,
+            &flat,
+            (&mesh, &surfaces),
+            triangles,
+            &placement,
+            &plan,
+        )
     }
 
     #[test]
     fn each_square_has_one_sensor() {
-        // Areas over the area of a square: 10 x 20, 60 x 60, 2 (10 + 20) x 6. Coordinates are no odd multiples of the spacing.
+        // Areas over the area of a square: 10 x 20, 60 x 60 less 10 x 20, 2 (10 + 20) x 6. Coordinates are no odd multiples of the spacing.
         for (kind, count) in [
             (Surface::Roof, 50),
-            (Surface::Ground, 900),
+            (Surface::Ground, 850),
+            (Surface::Covered, 50),
             (Surface::Facade, 90),
         ] {
             let sensors = on(&[kind]).expect("sensors");

@@ -2,10 +2,13 @@
 
 use antumbra::{Aabb, Bvh, Ray};
 
+use crate::normals::unit;
+use crate::orientation::dot;
+use crate::surfaces::Flat;
 use crate::{Error, Mesh, Orientation, memory};
 
 /// Points with normals, and where they come from.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sensors {
     /// Points, `[n, 3]`.
     pub points: Vec<[f32; 3]>,
@@ -13,6 +16,10 @@ pub struct Sensors {
     pub normals: Vec<[f32; 3]>,
     /// What else is known of each point, such as its name.
     pub labels: Vec<Label>,
+    /// Triangle of the mesh that each sensor was made on, `[n]`; none for points of a table or of lines.
+    pub triangles: Vec<u32>,
+    /// Triangle of each place that would have a sensor, but is covered.
+    pub covered: Vec<u32>,
     /// Where the points come from.
     pub layout: Layout,
 }
@@ -34,9 +41,10 @@ impl Label {
 }
 
 /// Where sensors come from.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub enum Layout {
     /// A list of their own.
+    #[default]
     List,
     /// Vertices of a mesh, in its order.
     Vertices,
@@ -78,23 +86,41 @@ const MOST_CELLS: f64 = 1e8;
 const CELLS: usize = 1 << 18;
 
 impl Sensors {
-    /// A sensor at every vertex of a mesh.
+    /// A sensor at every vertex of a mesh. Of the triangles around a vertex, it is on the first one that faces as the vertex does.
+    /// A vertex without triangles is left to be found as points of a table are.
     pub fn of_vertices(mesh: &Mesh) -> Self {
+        let mut nearest = vec![(f64::NEG_INFINITY, u32::MAX); mesh.positions.len()];
+        for (triangle, &corners) in (0..).zip(&mesh.indices) {
+            let facing = unit(mesh.twice(corners)).unwrap_or_default();
+            for corner in corners {
+                let cosine = dot(mesh.normals[corner as usize].map(f64::from), facing);
+                // Triangles of one plane differ by rounding.
+                if cosine > nearest[corner as usize].0 + 1e-6 {
+                    nearest[corner as usize] = (cosine, triangle);
+                }
+            }
+        }
         Self {
             points: mesh.positions.clone(),
             normals: mesh.normals.clone(),
-            labels: Vec::new(),
+            triangles: nearest.into_iter().map(|(_, triangle)| triangle).collect(),
             layout: Layout::Vertices,
+            ..Self::default()
         }
     }
 
     /// Sensors on the surfaces that are seen from above, in the middle of square cells. Normals are the surface normals, turned
-    /// upwards. The grid covers the bounds of the tree; `orientation` says where its rows run.
+    /// upwards. The grid covers the bounds of the tree; `orientation` says where its rows run, and `flat` which triangle of the mesh a
+    /// hit is on.
     ///
     /// # Errors
     /// [`Error::Range`] if the spacing is not above 0, [`Error::Cells`] if the grid has more than 100 million cells,
     /// [`Error::NothingBelow`] if no surface is seen.
-    pub fn on_grid(bvh: &Bvh, spacing: f64, orientation: &Orientation) -> Result<Self, Error> {
+    pub fn on_grid(
+        (bvh, flat): (&Bvh, Flat<'_>),
+        spacing: f64,
+        orientation: &Orientation,
+    ) -> Result<Self, Error> {
         if !(spacing > 0.0) {
             return Err(Error::Range {
                 what: "spacing",
@@ -119,13 +145,21 @@ impl Sensors {
             let local = [low[0] + column * spacing, high[1] - row * spacing, start];
             Ray::new(orientation.scene(local).map(|x| x as f32), down)
         };
-        let (mut points, mut normals, mut cells) = (Vec::new(), Vec::new(), Vec::new());
+        let mut sensors = Self::default();
+        let Self {
+            points,
+            normals,
+            triangles,
+            ..
+        } = &mut sensors;
+        let mut cells = Vec::new();
         for first in (0..width * height).step_by(CELLS) {
             let range = first..(first + CELLS).min(width * height);
             let rays: Vec<Ray> = range.clone().map(ray).collect();
             let hits = bvh.batch(&rays).intersect();
-            memory::grow(&mut points, "sensors", rays.len())?;
-            memory::grow(&mut normals, "sensors", rays.len())?;
+            memory::grow(points, "sensors", rays.len())?;
+            memory::grow(normals, "sensors", rays.len())?;
+            memory::grow(triangles, "sensors", rays.len())?;
             memory::grow(&mut cells, "sensors", rays.len())?;
             for ((ray, hit), cell) in rays.iter().zip(&hits).zip(range) {
                 let Some(hit) = hit else { continue };
@@ -140,24 +174,21 @@ impl Sensors {
                     (f64::from(ray.org[i]) + f64::from(hit.t) * f64::from(ray.dir[i])) as f32
                 }));
                 normals.push(normal.map(|x| sign * x));
+                triangles.push(flat([hit.geom_id, hit.prim_id]).unwrap_or(u32::MAX));
                 cells.push(cell as u32);
             }
         }
         if cells.is_empty() {
             return Err(Error::NothingBelow);
         }
-        Ok(Self {
-            points,
-            normals,
-            labels: Vec::new(),
-            layout: Layout::Grid(Grid {
-                width,
-                height,
-                cells,
-                corner: [low[0], high[1]],
-                spacing,
-            }),
-        })
+        sensors.layout = Layout::Grid(Grid {
+            width,
+            height,
+            cells,
+            corner: [low[0], high[1]],
+            spacing,
+        });
+        Ok(sensors)
     }
 
     /// Puts points without a height on the surface that is seen from above. A height that is missing is NaN, as
@@ -247,7 +278,8 @@ mod tests {
         // From the south-east, both walls there are seen, and no other one.
         let up = [0.0, 0.0, 1.0];
         let view = Orientation::from_vectors([1.0, -1.0, 0.0], up).expect("a view");
-        let sensors = Sensors::on_grid(&bvh, 0.1, &view).expect("sensors");
+        let sensors =
+            Sensors::on_grid((&bvh, &|[_, triangle]| Some(triangle)), 0.1, &view).expect("sensors");
         let Layout::Grid(grid) = &sensors.layout else {
             panic!("no grid");
         };

@@ -2,7 +2,7 @@
 
 use antumbra::LocalOrigin;
 
-use crate::{Label, Layout, Sensors};
+use crate::{Label, Sensors};
 
 /// Why a text is no table of points.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -64,12 +64,7 @@ impl Sensors {
         if columns.has_head {
             lines.next();
         }
-        let mut sensors = Self {
-            points: Vec::new(),
-            normals: Vec::new(),
-            labels: Vec::new(),
-            layout: Layout::List,
-        };
+        let mut sensors = Self::default();
         let mut points = Vec::new();
         for (line, text) in lines {
             let fields = fields(text, mark);

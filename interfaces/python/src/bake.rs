@@ -342,7 +342,7 @@ pub fn sensor_grid<'py>(
     spacing: f64,
     orientation: &Orientation,
 ) -> PyResult<Cells<'py>> {
-    let found = py.detach(|| Sensors::on_grid(scene.bvh(), spacing, orientation));
+    let found = py.detach(|| Sensors::on_grid((scene.bvh(), &|_| None), spacing, orientation));
     let sensors = found.map_err(failed)?;
     let local = scene.local();
     let points = sensors.points.iter().map(|&point| local.world(point));

@@ -2,7 +2,7 @@
 
 use antumbra::{Bvh, Geometry, Recipe};
 use antumbra_bake::{
-    Curvature, EARTH_RADIUS, Eyes, HeightField, Layout, Observer, Orientation, REFRACTION, Sensors,
+    Curvature, EARTH_RADIUS, Eyes, HeightField, Observer, Orientation, REFRACTION, Sensors,
     ViewshedJob, VisibilityJob, run,
 };
 use antumbra_raster::{Grid, Raster};
@@ -41,9 +41,7 @@ impl Terrain {
         let bvh = Bvh::build(&geometry, &Recipe::default()).expect("a tree");
         let list = |points: Vec<[f32; 3]>| Sensors {
             points,
-            normals: Vec::new(),
-            labels: Vec::new(),
-            layout: Layout::List,
+            ..Sensors::default()
         };
         let up = [0.0, 0.0, 1.0];
         let places = list(bent.clone());

@@ -68,14 +68,14 @@ pub struct PlaceArgs {
 pub struct PlacementArgs {
     /// Sensors on all surfaces, so far apart
     ///
-    /// Each stands for a square of this side. Triangles face as their corners run anticlockwise. A .csv has the column surface
-    /// with roof, ground, facade or underside.
+    /// Each stands for a square of this side. Closed bodies face outwards, other surfaces to the side that sees more sky. A .csv has
+    /// the column surface with roof, ground, facade or underside.
     #[arg(long, value_name = "METRES", group = "where", value_parser = values::positive)]
     pub surfaces: Option<f64>,
-    /// Only on roof, ground, facade, underside
+    /// Only on roof, ground, facade, underside, covered
     ///
-    /// Facades are more than 60 degrees from up and down. Of surfaces that face up, roofs have a surface below, and ground has
-    /// none. Several are separated by commas.
+    /// Facades are more than 60 degrees from up and down. Of surfaces that face up, roofs belong to buildings, and ground does not.
+    /// Places that are covered, as inside of houses, are none of these: see --covered. Several are separated by commas.
     #[arg(long, value_name = "KINDS", requires = "surfaces", value_delimiter = ',', value_parser = surface)]
     pub on: Vec<Surface>,
     /// Distance from the surface
@@ -87,6 +87,12 @@ pub struct PlacementArgs {
         allow_negative_numbers = true
     )]
     pub offset: f64,
+    /// What is so close below a surface is covered
+    ///
+    /// As a floor covers the terrain. Places that see no sky are covered if the first surface above is nearer than this, or if they
+    /// are inside of a body. Places below balconies, bridges and trees are not covered, only shaded.
+    #[arg(long, value_name = "METRES", default_value_t = 0.5, requires = "surfaces", value_parser = values::from_zero)]
+    pub covered: f64,
     /// Number the storeys of facades, from 0
     ///
     /// In the column storey of a .csv: the height above the surface just outside, over this one.
@@ -115,6 +121,7 @@ impl PlacementArgs {
             ("--on", !self.on.is_empty()),
             ("--offset", self.offset != 0.0),
             ("--storey-height", self.storey_height.is_some()),
+            ("--covered", self.covered != 0.5),
         ];
         let given = on_surfaces.iter().find(|(_, is_given)| *is_given);
         match (given, self.surfaces, self.spacing, &self.along) {
@@ -127,7 +134,10 @@ impl PlacementArgs {
     /// Kinds of surfaces with sensors.
     pub fn kinds(&self) -> Vec<Surface> {
         match self.on.is_empty() {
-            true => Surface::ALL.to_vec(),
+            true => Surface::ALL
+                .into_iter()
+                .filter(|&kind| kind != Surface::Covered)
+                .collect(),
             false => self.on.clone(),
         }
     }
@@ -210,5 +220,5 @@ fn surface(text: &str) -> Result<Surface, String> {
     let name = text.trim().trim_end_matches('s');
     let mut all = Surface::ALL.into_iter();
     let found = all.find(|surface| surface.name().eq_ignore_ascii_case(name));
-    found.ok_or_else(|| "known are roof, ground, facade and underside".into())
+    found.ok_or_else(|| "known are roof, ground, facade, underside and covered".into())
 }

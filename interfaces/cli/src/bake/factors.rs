@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use antumbra::Bvh;
-use antumbra_bake::{Array, Entry, Groups, Mesh, Orientation, ViewFactorJob};
+use antumbra_bake::{Array, Entry, Groups, Orientation, ViewFactorJob};
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
@@ -65,7 +65,7 @@ pub fn run(
         earth: None,
     };
     let mut files = bake.declare(&[], &[])?;
-    let ground = bake.ground(isa, memory, &mut files)?;
+    let mut ground = bake.ground(isa, memory, &mut files)?;
     let scene = &ground.loaded.scene;
     let mut shapes = scene.shapes.iter();
     if shapes.any(|shape| !matches!(shape.geometry, Geometry::Mesh(_))) {
@@ -74,6 +74,9 @@ pub fn run(
     }
     let up = ground.up(args.up)?;
     let compass = Orientation::new(up, args.north).map_err(Failure::usage)?;
+    // A room is seen from inside.
+    ground.keep_sides(&compass);
+    let scene = &ground.loaded.scene;
     let groups = groups::of(&ground, args.by, &compass)?;
     if groups.names.len() > MOST {
         let found = groups.names.len();
@@ -122,11 +125,7 @@ fn tree(surfaces: &[Vec<[[f32; 3]; 3]>]) -> Result<Bvh, Failure> {
     let positions: Vec<[f32; 3]> = surfaces.iter().flatten().flatten().copied().collect();
     let triangles = 0..positions.len() as u32 / 3;
     let indices = triangles.map(|triangle| [0, 1, 2].map(|corner| 3 * triangle + corner));
-    places::tree(&Mesh {
-        indices: indices.collect(),
-        positions,
-        ..Mesh::default()
-    })
+    places::tree(&positions, indices.collect())
 }
 
 /// Writes a table or arrays.

@@ -6,7 +6,10 @@ use std::time::Instant;
 
 use antumbra::recipe::{Builder, Engine};
 use antumbra::{Bvh, Isa, LocalOrigin};
-use antumbra_bake::{CREASE_ANGLE, Curvature, Error, Key, Mesh, Orientation, Sensors, UpAxis};
+use antumbra_bake::{
+    CREASE_ANGLE, Curvature, Error, Flat, Key, Mesh, Orientation, Sensors, Surface, Surfaces,
+    UpAxis,
+};
 use antumbra_lab::count;
 use antumbra_load::{Extent, Loaded, MemorySize, Up};
 use antumbra_render::World;
@@ -26,6 +29,8 @@ pub struct Ground {
     pub mesh: Mesh,
     /// Names of the triangles of `mesh`.
     pub parts: Parts,
+    /// Kinds of its triangles, once these have been [turned](Ground::face).
+    pub surfaces: Option<Surfaces>,
     /// Origin of all positions.
     pub local: LocalOrigin,
     /// How the scene is bent, if it is.
@@ -66,6 +71,7 @@ impl Ground {
             bvh,
             mesh,
             parts,
+            surfaces: None,
             local,
             curvature,
             build_seconds: start.elapsed().as_secs_f64(),
@@ -85,6 +91,65 @@ impl Ground {
             ));
         }
         Ok(())
+    }
+
+    /// Turns closed bodies outwards, and says how many. For bakes that look from both sides of what is open.
+    pub fn turn_bodies(&mut self) {
+        let objects = self.parts.objects(&self.mesh).numbers();
+        let bodies = self.mesh.orient(&objects);
+        self.tell_turned(bodies.turned, 0);
+    }
+
+    /// Turns surfaces to the side that people mean, and says how many.
+    pub fn face(&mut self, plan: &Orientation) {
+        let objects = self.parts.objects(&self.mesh).numbers();
+        let flat = |ids| self.parts.flat(ids);
+        let surfaces = Surfaces::new(&mut self.mesh, &objects, (&self.bvh, &flat), plan);
+        self.tell_turned(surfaces.turned, surfaces.faced);
+        self.surfaces = Some(surfaces);
+    }
+
+    /// Finds kinds of surfaces that face as the file winds them.
+    pub fn keep_sides(&mut self, plan: &Orientation) {
+        let objects = self.parts.objects(&self.mesh).numbers();
+        let tree: (_, Flat<'_>) = (&self.bvh, &|ids| self.parts.flat(ids));
+        self.surfaces = Some(Surfaces::as_wound(&self.mesh, &objects, tree, plan));
+    }
+
+    fn tell_turned(&self, closed: usize, open: usize) {
+        let bodies = |number: usize| match number {
+            1 => "1 body".to_owned(),
+            more => format!("{} bodies", count(more as u64)),
+        };
+        let closed = (closed > 0).then(|| format!("{} that faced inwards", bodies(closed)));
+        let open = (open > 0).then(|| format!("{} that faced away from the sky", bodies(open)));
+        let turned: Vec<String> = closed.into_iter().chain(open).collect();
+        if !turned.is_empty() {
+            let scene = &self.loaded.scene.name;
+            tell(format_args!("{scene}: turned {}", turned.join(" and ")));
+        }
+    }
+
+    /// Which of some points are inside of bodies.
+    pub fn inside(
+        &self,
+        points: &[[f32; 3]],
+        some: impl Iterator<Item = usize>,
+        plan: &Orientation,
+    ) -> Vec<usize> {
+        let mut mesh = self.mesh.clone();
+        let objects = self.parts.objects(&mesh).numbers();
+        let tree: (_, Flat<'_>) = (&self.bvh, &|ids| self.parts.flat(ids));
+        let surfaces = Surfaces::new(&mut mesh, &objects, tree, plan);
+        some.filter(|&index| surfaces.is_inside(tree, &mesh, points[index]))
+            .collect()
+    }
+
+    /// Kinds of the triangles, after [`Ground::face`].
+    pub fn kinds(&self) -> &[Surface] {
+        self.surfaces
+            .as_ref()
+            .map_or(&[], |surfaces| &surfaces.kinds)
     }
 
     /// Adds the geometry to the key of a job.
@@ -142,11 +207,16 @@ impl Ground {
 
     /// Sensors on a grid.
     pub fn grid(&self, spacing: f64, plan: &Orientation) -> Result<Sensors, Failure> {
-        self.grid_of(&self.bvh, spacing, plan)
+        self.grid_of((&self.bvh, &|ids| self.parts.flat(ids)), spacing, plan)
     }
 
     /// Sensors on a grid that sees the surfaces of a tree, which are some of the scene.
-    pub fn grid_of(&self, bvh: &Bvh, spacing: f64, plan: &Orientation) -> Result<Sensors, Failure> {
+    pub fn grid_of(
+        &self,
+        tree: (&Bvh, Flat<'_>),
+        spacing: f64,
+        plan: &Orientation,
+    ) -> Result<Sensors, Failure> {
         let offset = self.bvh.bounds().origin_offset();
         if f64::from(offset) > 1e-3 * spacing {
             say(format_args!(
@@ -154,7 +224,7 @@ impl Ground {
                  scene is large for such a grid"
             ));
         }
-        let sensors = Sensors::on_grid(bvh, spacing, plan);
+        let sensors = Sensors::on_grid(tree, spacing, plan);
         sensors.map_err(|error| match error {
             Error::NothingBelow => Failure::Usage(format!("--grid: {error}; is --up right?")),
             _ => Failure::Usage(format!("--grid {spacing}: that makes {error}")),

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use antumbra_bake::{Groups, Orientation};
+use antumbra_bake::{Groups, Orientation, Sensors, Surface};
 use antumbra_image::atomic_write;
 use antumbra_lab::write_json;
 use serde::{Serialize, Serializer};
@@ -13,7 +13,7 @@ use super::files::{Format, field};
 use super::ground::Ground;
 use super::sun::Baked;
 use crate::args::By;
-use crate::exit::Failure;
+use crate::exit::{Failure, say};
 use crate::interrupt;
 
 /// Values of a group with their names, in the order of the columns.
@@ -37,7 +37,7 @@ pub fn is_table(path: &Path) -> Result<bool, Failure> {
     Ok(Format::of(path, &["csv", "json"], sentence)? == Format::Csv)
 }
 
-/// Groups of the triangles of a scene. `compass` says where its north is.
+/// Groups of the triangles of a scene whose surfaces are known. `compass` says where its north is.
 pub fn of(ground: &Ground, by: By, compass: &Orientation) -> Result<Groups, Failure> {
     let (mesh, parts) = (&ground.mesh, &ground.parts);
     match by {
@@ -56,7 +56,7 @@ pub fn of(ground: &Ground, by: By, compass: &Orientation) -> Result<Groups, Fail
         }
         By::Facade => {
             let objects = parts.objects(mesh);
-            let sides = mesh.sides(&ground.bvh, compass);
+            let sides = mesh.sides(ground.kinds(), compass);
             let name = |triangle: usize| vec![objects.name(triangle), sides[triangle].to_owned()];
             Ok(Groups::new(mesh, vec!["object", "facade"], name))
         }
@@ -68,15 +68,24 @@ impl Baked<'_> {
     pub fn groups(&self, path: &Path) -> Result<Vec<Row>, Failure> {
         let _writing = interrupt::writing();
         let groups = of(self.ground, self.args.by, &self.sunlight.orientation)?;
-        let triangles = self.places.triangles(self.ground, self.up)?;
+        let triangles = self.places.triangles(self.ground, self.up, &groups)?;
+        let cover = Cover::new(&groups, self.sensors, &triangles);
         let values = &self.found.values;
         let reflected = self.reflected();
         let metres = self.args.places.units.metres();
-        let areas: Vec<f64> = groups
+        let whole: Vec<f64> = groups
             .areas
             .iter()
             .map(|area| area * metres * metres)
             .collect();
+        let areas: Vec<f64> = whole
+            .iter()
+            .zip(&cover.shares)
+            .map(|(area, share)| area * (1.0 - share))
+            .collect();
+        if let Some(spacing) = self.args.places.placement.surfaces {
+            self.check_areas(&groups, &cover, &whole, spacing * spacing);
+        }
         let mut columns = vec![("hours", &values.hours), ("sky_view", &values.sky_view)];
         if !values.direct.is_empty() {
             columns.push(("direct_kwh_m2", &values.direct));
@@ -93,7 +102,7 @@ impl Baked<'_> {
             rows.push(row);
         }
         for (index, (name, list)) in columns.into_iter().enumerate() {
-            let found = groups.statistics(&triangles, list);
+            let found = groups.statistics(&cover.open, list);
             for ((row, own), area) in rows.iter_mut().zip(found).zip(&areas) {
                 if index == 0 {
                     row.push("sensors", own.count.into());
@@ -106,11 +115,135 @@ impl Baked<'_> {
                 }
             }
         }
+        rows.extend(cover.rows(&groups, &whole, rows.first()));
         match is_table(path)? {
             true => atomic_write(path, |file| file.write_all(table(&rows).as_bytes()))?,
             false => write_json(&rows, path)?,
         }
         Ok(rows)
+    }
+}
+
+/// Places of groups that are covered.
+struct Cover {
+    /// Triangle of each sensor that is on one and not covered.
+    open: Vec<Option<u32>>,
+    /// Number of places of each group that are covered.
+    counts: Vec<usize>,
+    /// Number of places of each group.
+    places: Vec<usize>,
+    /// Share of each group that is covered.
+    shares: Vec<f64>,
+}
+
+impl Cover {
+    fn new(groups: &Groups, sensors: &Sensors, triangles: &[Option<u32>]) -> Self {
+        let is_covered = |sensor: usize| {
+            let kinds = sensors
+                .labels
+                .iter()
+                .find(|label| label.column == "surface");
+            kinds.is_some_and(|kinds| kinds.values[sensor] == Surface::Covered.name())
+        };
+        let mut counts = vec![0; groups.names.len()];
+        let mut places = counts.clone();
+        let mut open = triangles.to_vec();
+        for (sensor, triangle) in open.iter_mut().enumerate() {
+            let Some(group) =
+                triangle.map(|triangle| groups.of_triangle[triangle as usize] as usize)
+            else {
+                continue;
+            };
+            places[group] += 1;
+            if is_covered(sensor) {
+                counts[group] += 1;
+                *triangle = None;
+            }
+        }
+        for &triangle in &sensors.covered {
+            let group = groups.of_triangle[triangle as usize] as usize;
+            counts[group] += 1;
+            places[group] += 1;
+        }
+        let shares = counts
+            .iter()
+            .zip(&places)
+            .map(|(&count, &all)| count as f64 / all.max(1) as f64);
+        Self {
+            shares: shares.collect(),
+            open,
+            counts,
+            places,
+        }
+    }
+
+    /// A row for what is covered of each object, or of all groups that are not facades. It has the columns of `like`.
+    fn rows(&self, groups: &Groups, areas: &[f64], like: Option<&Row>) -> Vec<Row> {
+        let mut sums: Vec<(Vec<String>, usize, f64)> = Vec::new();
+        for (group, names) in groups
+            .names
+            .iter()
+            .enumerate()
+            .filter(|(group, _)| self.counts[*group] > 0)
+        {
+            let mut names: Vec<String> = names[..names.len() - 1].to_vec();
+            names.push(Surface::Covered.name().into());
+            let area = areas[group] * self.shares[group];
+            match sums.iter_mut().find(|(known, ..)| *known == names) {
+                Some((_, count, sum)) => {
+                    *count += self.counts[group];
+                    *sum += area;
+                }
+                None => sums.push((names, self.counts[group], area)),
+            }
+        }
+        let columns = like.iter().flat_map(|row| &row.0).map(|(name, _)| name);
+        let row = |(names, count, area): (Vec<String>, usize, f64)| {
+            let mut row = Row(columns
+                .clone()
+                .map(|name| (name.clone(), Value::Null))
+                .collect());
+            let known = names
+                .into_iter()
+                .map(Value::from)
+                .chain([number(area), count.into()]);
+            for (place, value) in row.0.iter_mut().zip(known) {
+                place.1 = value;
+            }
+            row
+        };
+        sums.into_iter().map(row).collect()
+    }
+}
+
+impl Baked<'_> {
+    /// Warns of groups whose sensors stand for another area than they have.
+    fn check_areas(&self, groups: &Groups, cover: &Cover, areas: &[f64], square: f64) {
+        let names: Vec<String> = (0..areas.len())
+            .filter(|&group| {
+                let area = cover.places[group] as f64 * square;
+                // About so much hangs on where the lattice begins.
+                let edge = (square * areas[group]).sqrt();
+                cover.places[group] > 0 && (area - areas[group]).abs() > 0.1 * areas[group] + edge
+            })
+            .map(|group| {
+                let (name, area) = (groups.names[group].join(" "), areas[group]);
+                let own = cover.places[group] as f64 * square;
+                format!("{name}: {own:.0} m² of {area:.0}")
+            })
+            .collect();
+        if !names.is_empty() {
+            let some = names
+                .iter()
+                .take(5)
+                .map(String::as_str)
+                .collect::<Vec<_>>()
+                .join(", ");
+            say(format_args!(
+                "warning: sensors stand for more or less than nine tenths of the area of {} groups ({some}): a smaller --surfaces may help",
+                names.len(),
+            ));
+        }
     }
 }
 

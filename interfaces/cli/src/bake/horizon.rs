@@ -86,9 +86,9 @@ pub fn run(
     if args.places.vertices && raster::is_raster(&args.scene) && is_upright(args) {
         return of_cells(args, &bake, files, &azimuths, (isa, memory));
     }
-    let ground = bake.ground(isa, memory, &mut files)?;
+    let mut ground = bake.ground(isa, memory, &mut files)?;
     let up = ground.up(args.places.up)?;
-    let places = Places::new(&args.places, &ground, up)?;
+    let places = Places::new(&args.places, &mut ground, up)?;
     let compass = Orientation::new(up, args.places.north).map_err(Failure::usage)?;
     let sensors = &places.sensors;
     let job = HorizonJob::new(&sensors.points, &sensors.normals, &azimuths, &compass)?;

@@ -113,7 +113,7 @@ impl<'a> Sheet<'a> {
         let coarser = (columns as f64 * rows as f64 / MOST_PIXELS).sqrt().max(1.0);
         let pixel = coarser * map.relief_pixel(size).map_err(Failure::work)?;
         // Sensors of pixels are where rays from above hit the model.
-        let seen = Sensors::on_grid(plan.bvh, pixel, plan.orientation)?;
+        let seen = Sensors::on_grid((plan.bvh, &|_| None), pixel, plan.orientation)?;
         sheet.relief = Seen::new(&seen, plan.orientation, pixel);
         sheet.size = size;
         Ok(sheet)

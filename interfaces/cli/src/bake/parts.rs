@@ -1,6 +1,6 @@
 //! Names of the triangles of a scene: objects and materials.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 use antumbra_bake::Mesh;
 use antumbra_load::{Names, Part};
@@ -85,6 +85,21 @@ impl Objects<'_> {
                 part.map_or_else(String::new, |part| part.object.clone())
             }
         }
+    }
+
+    /// A number of the object of each triangle.
+    pub fn numbers(self) -> Vec<u32> {
+        if let Some(bodies) = self.bodies {
+            return bodies;
+        }
+        let (mut known, mut numbers, mut start) = (HashMap::new(), Vec::new(), 0);
+        for (end, part) in &self.parts.runs {
+            let next = known.len() as u32;
+            let number = *known.entry(&part.object).or_insert(next);
+            numbers.extend(std::iter::repeat_n(number, end - start));
+            start = *end;
+        }
+        numbers
     }
 
     /// Some of the names.

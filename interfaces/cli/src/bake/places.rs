@@ -3,20 +3,21 @@
 use std::path::Path;
 
 use antumbra::{Bvh, Geometry, Recipe};
-use antumbra_bake::{Mesh, Orientation, Placement, Sensors, UpAxis};
+use antumbra_bake::{Flat, Groups, Orientation, Placement, Sensors, UpAxis};
+use antumbra_lab::count;
 
 use super::ground::{self, Ground};
 use super::raster;
 use crate::args::PlaceArgs;
-use crate::exit::Failure;
+use crate::exit::{Failure, say};
 
 /// Sensors, and how they were placed.
 pub struct Places {
     pub sensors: Sensors,
     /// East, north and up in which the rows of a grid run; turned where facades are seen from a side.
     pub plan: Orientation,
-    /// Tree of the object that has sensors; `None` if all have.
-    only: Option<Bvh>,
+    /// Tree of the object that has sensors, and its triangles in the mesh of the scene; `None` if all have.
+    only: Option<(Bvh, Vec<u32>)>,
 }
 
 /// Refuses places that cannot be, before anything is read.
@@ -43,7 +44,7 @@ pub fn check_raster(path: &Path, args: &PlaceArgs, scene: &Path) -> Result<(), F
 
 impl Places {
     /// The sensors that the command line chooses.
-    pub fn new(args: &PlaceArgs, ground: &Ground, up: UpAxis) -> Result<Self, Failure> {
+    pub fn new(args: &PlaceArgs, ground: &mut Ground, up: UpAxis) -> Result<Self, Failure> {
         let level = Orientation::new(up, 0.0).map_err(Failure::usage)?;
         let plan = match args.seen_from {
             Some(side) => {
@@ -53,22 +54,22 @@ impl Places {
             }
             None => level,
         };
-        let mesh = match &args.only {
-            Some(name) => Some(object(name, ground)?),
-            None => None,
-        };
-        let only = match &mesh {
-            Some(mesh) => Some(tree(mesh)?),
-            None => None,
-        };
+        // A grid is turned to whoever looks at it, and a table has normals of its own.
+        if args.placement.surfaces.is_some() || args.vertices {
+            ground.face(&level);
+        }
+        let ground = &*ground;
         let mut places = Self {
-            sensors: Sensors::of_vertices(&Mesh::default()),
+            sensors: Sensors::default(),
             plan,
-            only,
+            only: args
+                .only
+                .as_ref()
+                .map(|name| object(name, ground))
+                .transpose()?,
         };
         let units = |metres: f64| metres / args.units.metres();
         let placement = &args.placement;
-        let mesh = mesh.as_ref().unwrap_or(&ground.mesh);
         places.sensors = if let Some(path) = &args.sensors {
             ground::sensors(path, ground, &level)?
         } else if let Some(path) = &placement.along {
@@ -76,17 +77,35 @@ impl Places {
             let spacing = units(placement.spacing.unwrap_or_default());
             let sensors = Sensors::along_lines(&corners, spacing);
             sensors.map_err(|error| Failure::Usage(format!("--along: {error}")))?
-        } else if let Some(spacing) = placement.surfaces {
+        } else if let (Some(spacing), Some(surfaces)) = (placement.surfaces, &ground.surfaces) {
             let options = Placement {
                 spacing: units(spacing),
                 kinds: placement.kinds(),
                 offset: units(placement.offset),
                 storey: placement.storey_height.map(units),
+                covered: units(placement.covered),
             };
-            let sensors = Sensors::on_surfaces(&ground.bvh, mesh, &options, &level);
+            let triangles = match &places.only {
+                Some((_, triangles)) => triangles.clone(),
+                None => (0..ground.mesh.indices.len() as u32).collect(),
+            };
+            let sensors = Sensors::on_surfaces(
+                &ground.bvh,
+                &|ids| ground.parts.flat(ids),
+                (&ground.mesh, surfaces),
+                triangles,
+                &options,
+                &level,
+            );
             sensors.map_err(|error| Failure::Usage(format!("--surfaces: {error}")))?
         } else if let Some(spacing) = args.grid {
-            ground.grid_of(places.bvh(ground), units(spacing), &places.plan)?
+            match &places.only {
+                Some((bvh, triangles)) => {
+                    let flat = |[_, triangle]: [u32; 2]| triangles.get(triangle as usize).copied();
+                    ground.grid_of((bvh, &flat), units(spacing), &places.plan)?
+                }
+                None => ground.grid(units(spacing), &places.plan)?,
+            }
         } else {
             Sensors::of_vertices(&ground.mesh)
         };
@@ -101,39 +120,57 @@ impl Places {
 
     /// Tree of the surfaces that have sensors.
     pub fn bvh<'a>(&'a self, ground: &'a Ground) -> &'a Bvh {
-        self.only.as_ref().unwrap_or(&ground.bvh)
+        self.only.as_ref().map_or(&ground.bvh, |(bvh, _)| bvh)
     }
 
-    /// Triangle of the mesh that each sensor is on, if any.
-    pub fn triangles(&self, ground: &Ground, up: UpAxis) -> Result<Vec<Option<u32>>, Failure> {
+    /// Triangle of the mesh that each sensor is on, if any. Points of a table are looked for, and a warning says how many lie
+    /// between `groups`.
+    pub fn triangles(
+        &self,
+        ground: &Ground,
+        up: UpAxis,
+        groups: &Groups,
+    ) -> Result<Vec<Option<u32>>, Failure> {
+        let sensors = &self.sensors;
+        if !sensors.triangles.is_empty() {
+            let known = |&triangle: &u32| (triangle != u32::MAX).then_some(triangle);
+            return Ok(sensors.triangles.iter().map(known).collect());
+        }
         let level = Orientation::new(up, 0.0).map_err(Failure::usage)?;
-        let ids = self.sensors.triangles(&ground.bvh, &level).into_iter();
-        Ok(ids
-            .map(|ids| ids.and_then(|ids| ground.parts.flat(ids)))
-            .collect())
+        let group = |triangle: u32| groups.of_triangle[triangle as usize];
+        let tree: (_, Flat<'_>) = (&ground.bvh, &|ids| ground.parts.flat(ids));
+        let (triangles, ambiguous) = sensors.locate(tree, &ground.mesh, &group, &level);
+        if ambiguous > 0 {
+            say(format_args!(
+                "warning: {} of {} points lie on surfaces of two groups that touch, and count for one of them: give them normals, or move \
+                 them",
+                count(ambiguous as u64),
+                count(triangles.len() as u64),
+            ));
+        }
+        Ok(triangles)
     }
 }
 
-/// The triangles of an object.
-fn object(name: &str, ground: &Ground) -> Result<Mesh, Failure> {
+/// Tree of an object, and its triangles.
+fn object(name: &str, ground: &Ground) -> Result<(Bvh, Vec<u32>), Failure> {
     let names = ground.parts.objects(&ground.mesh);
-    let is_own = |triangle: &usize| names.name(*triangle) == name;
-    let triangles = (0..ground.mesh.indices.len()).filter(is_own);
-    let indices: Vec<[u32; 3]> = triangles.map(|i| ground.mesh.indices[i]).collect();
-    if indices.is_empty() {
+    let is_own = |triangle: &u32| names.name(*triangle as usize) == name;
+    let triangles: Vec<u32> = (0..ground.mesh.indices.len() as u32)
+        .filter(is_own)
+        .collect();
+    if triangles.is_empty() {
         let some = names.some(8).join(", ");
         let reason = format!("--only: there is no object {name:?}; some are {some}");
         return Err(Failure::Usage(reason));
     }
-    Ok(Mesh {
-        indices,
-        ..ground.mesh.clone()
-    })
+    let indices = triangles.iter().map(|&i| ground.mesh.indices[i as usize]);
+    Ok((tree(&ground.mesh.positions, indices.collect())?, triangles))
 }
 
-/// Tree of a mesh.
-pub fn tree(mesh: &Mesh) -> Result<Bvh, Failure> {
-    let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
+/// Tree of triangles.
+pub fn tree(positions: &[[f32; 3]], indices: Vec<[u32; 3]>) -> Result<Bvh, Failure> {
+    let geometry = [Geometry::triangles(positions, indices)];
     let built = Bvh::build(&geometry, &Recipe::default());
     built.map_err(|error| Failure::work(error.to_string()))
 }

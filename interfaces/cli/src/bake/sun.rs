@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use antumbra_bake::{
-    Array, Clock, Entry, Label, Layout, Moment, Place, Sensors, SunFound, SunJob, SunValues,
-    Sunlight, SunlightClass, UpAxis,
+    Array, Clock, Entry, Label, Layout, Moment, Orientation, Place, Sensors, SunFound, SunJob,
+    SunValues, Sunlight, SunlightClass, Surface, UpAxis,
 };
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
@@ -21,7 +21,7 @@ use super::places::{self, Places};
 use super::when::{When, read_weather};
 use super::{frames, groups, hourly, raster};
 use crate::args::{Shown, SunArgs};
-use crate::exit::{Failure, tell};
+use crate::exit::{Failure, say, tell};
 use crate::{interrupt, json};
 
 /// The JSON document.
@@ -155,13 +155,16 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     let weather = args.epw.as_deref().map(read_weather).transpose()?;
     let when = When::new(args, weather.as_ref())?;
     let steps = when.steps(args, weather.as_ref())?;
-    let ground = bake.ground(isa, memory, &mut files)?;
+    let mut ground = bake.ground(isa, memory, &mut files)?;
     let up = ground.up(args.places.up)?;
     let sunlight = when.sunlight(args, steps, up)?;
     if let Some(path) = &args.frames {
         frames::declare(path, &sunlight, &mut files)?;
     }
-    let places = Places::new(&args.places, &ground, up)?;
+    let places = Places::new(&args.places, &mut ground, up)?;
+    if args.groups.is_some() && ground.surfaces.is_none() {
+        ground.face(&sunlight.orientation);
+    }
     let sensors = &places.sensors;
     let job = SunJob::new(&sensors.points, &sensors.normals, &sunlight)?;
     let done = bake.compute(&job, &ground, &ground.bvh)?;
@@ -222,12 +225,73 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
             count(without as u64)
         ));
     }
+    baked.tell_dark();
+    if args.places.sensors.is_some() {
+        warn_inside(
+            &ground,
+            &places.sensors,
+            &found.values.sky_open,
+            &sunlight.orientation,
+        );
+    }
     bake.tell_done("rays", document.rays, document.trace_seconds);
     chunks::forget(done.checkpoint.as_deref());
     Ok(())
 }
 
+/// Warns of points of a table that are inside of bodies.
+fn warn_inside(ground: &Ground, sensors: &Sensors, sky: &[f64], plan: &Orientation) {
+    let mut dark = (0..sensors.points.len())
+        .filter(|&index| sky[index] == 0.0)
+        .peekable();
+    if dark.peek().is_none() {
+        return;
+    }
+    let inside = ground.inside(&sensors.points, dark, plan);
+    if let Some(first) = inside.first() {
+        say(format_args!(
+            "warning: {} of {} points lie inside of bodies and see nothing of the sky; the first is point {}",
+            count(inside.len() as u64),
+            count(sensors.points.len() as u64),
+            first + 1,
+        ));
+    }
+}
+
+/// Share of facades that see nothing, above which something is wrong with the model.
+const DARK: f64 = 0.05;
+
 impl Baked<'_> {
+    /// Says what is covered, and warns of sensors that see nothing of the sky although nobody would expect it.
+    fn tell_dark(&self) {
+        let sensors = self.sensors;
+        if !sensors.covered.is_empty() {
+            tell(format_args!(
+                "{} places more are covered: inside of bodies, or without sky close below a surface",
+                count(sensors.covered.len() as u64),
+            ));
+        }
+        let is_dark = |index: &usize| self.found.values.sky_open[*index] == 0.0;
+        let dark: Vec<usize> = (0..sensors.points.len()).filter(is_dark).collect();
+        let kinds = sensors
+            .labels
+            .iter()
+            .find(|label| label.column == "surface");
+        if let (Some(kinds), Some(_)) = (kinds, self.args.places.placement.surfaces) {
+            let is_facade = |kind: &String| kind == Surface::Facade.name();
+            let facades = kinds.values.iter().filter(|kind| is_facade(kind)).count();
+            let closed = dark
+                .iter()
+                .filter(|&&index| is_facade(&kinds.values[index]))
+                .count();
+            if closed as f64 > DARK * facades as f64 {
+                say(format_args!(
+                    "warning: {closed} of {facades} sensors on facades see nothing of the sky: are walls inside of others, or turned the wrong way?",
+                ));
+            }
+        }
+    }
+
     /// The value that colours show, of every sensor.
     fn shown(&self) -> Vec<f32> {
         let values = &self.found.values;

@@ -73,10 +73,10 @@ fn facades_and_materials_have_areas_and_means() {
     let rows = table(&place, "facades.csv");
     let head = "object,facade,area_m2,sensors,hours_mean,hours_min,hours_max,sky_view_mean,sky_view_min,sky_view_max";
     assert_eq!(rows[0].join(","), head);
-    // The ground below the houses counts as roof or ground by what is below: it is one plane.
+    // The ground below the houses is covered.
     let names: Vec<String> = rows[1..].iter().map(|row| row[..4].join(" ")).collect();
     let wanted = [
-        "ground ground 3600.0 3600",
+        "ground ground 3400.0 3400",
         "mill roof 100.0 100",
         "school hall roof 100.0 100",
         "mill S 60.0 60",
@@ -87,6 +87,7 @@ fn facades_and_materials_have_areas_and_means() {
         "school hall E 60.0 60",
         "school hall N 60.0 60",
         "school hall W 60.0 60",
+        "ground covered 200.0 200",
     ];
     assert_eq!(names, wanted);
     let hours = |index: usize| rows[index][4].parse::<f64>().expect("a number");
@@ -120,8 +121,156 @@ fn facades_and_materials_have_areas_and_means() {
     let areas: Vec<f64> = (0..3)
         .map(|i| found[i]["area_m2"].as_f64().expect("an area"))
         .collect();
-    assert_eq!(areas, [3600.0, 200.0, 480.0]);
+    assert_eq!(areas, [3400.0, 200.0, 480.0]);
     assert_eq!(found[1]["material"], "tiles");
+}
+
+/// Two houses of 10 and 20 m, wall against wall, as a file of boxes; the second one wound the other way or not.
+fn semi_detached(is_turned: bool) -> String {
+    let mut text = String::new();
+    for (index, (name, x, z)) in [("low", 0, 10), ("high", 10, 20)].iter().enumerate() {
+        let at = |corner: usize| 8 * index + corner + 1;
+        text += &format!("o {name}\n");
+        for height in [0, *z] {
+            for [dx, y] in [[0, 0], [10, 0], [10, 10], [0, 10]] {
+                text += &format!("v {} {y} {height}\n", x + dx);
+            }
+        }
+        let sides = [
+            [4, 5, 6, 7],
+            [3, 2, 1, 0],
+            [0, 1, 5, 4],
+            [1, 2, 6, 5],
+            [2, 3, 7, 6],
+            [3, 0, 4, 7],
+        ];
+        for mut side in sides {
+            if is_turned && index == 1 {
+                side.reverse();
+            }
+            let [a, b, c, d] = side.map(at);
+            text += &format!("f {a} {b} {c} {d}\n");
+        }
+    }
+    text
+}
+
+#[test]
+fn walls_that_touch_count_for_their_own_house_and_only_where_they_are_free() {
+    let mut tables = Vec::new();
+    for is_turned in [false, true] {
+        let place = Place::empty();
+        place.write("houses.obj", semi_detached(is_turned));
+        let flags = [
+            "sun",
+            "houses.obj",
+            "--surfaces",
+            "1",
+            "--on",
+            "facade",
+            "-o",
+            "all.csv",
+            "--groups",
+            "facades.csv",
+            "--by",
+            "facade",
+        ];
+        let run = place.run(&[&flags[..], &DAY].concat()).expect(0);
+        assert_eq!(
+            run.stderr.contains("turned 1 body that faced inwards"),
+            is_turned,
+            "{}",
+            run.stderr
+        );
+        assert!(
+            run.stderr.contains("200 places more are covered"),
+            "{}",
+            run.stderr
+        );
+        assert!(!run.stderr.contains("warning"), "{}", run.stderr);
+        let rows = table(&place, "facades.csv");
+        let named = |name: &str| {
+            rows.iter()
+                .find(|row| row[..2].join(" ") == name)
+                .expect(name)
+        };
+        for (name, area) in [
+            ("low W", "100.0"),
+            ("low E", "0.0"),
+            ("high W", "100.0"),
+            ("high E", "200.0"),
+            ("low covered", "100.0"),
+            ("high covered", "100.0"),
+        ] {
+            assert_eq!(named(name)[2], area, "{name}");
+        }
+        // Means of the sensors above the roof of the lower house.
+        let sensors = table(&place, "all.csv");
+        let number = |row: &[String], column: usize| row[column].parse::<f64>().expect("a number");
+        let is_west = |row: &&Vec<String>| number(row, 1) == 10.0 && number(row, 4) == -1.0;
+        let own: Vec<f64> = sensors[1..]
+            .iter()
+            .filter(is_west)
+            .map(|row| number(row, 7))
+            .collect();
+        assert_eq!(own.len(), 100);
+        assert!((number(named("high W"), 4) - own.iter().sum::<f64>() / 100.0).abs() < 1e-5);
+        tables.push(rows);
+    }
+    assert_eq!(tables[0], tables[1]);
+}
+
+#[test]
+fn points_inside_of_houses_or_between_two_are_told() {
+    let place = Place::empty();
+    place.write("houses.obj", semi_detached(false));
+    place.write(
+        "points.csv",
+        "x,y,z,nx,ny,nz\n5,5,5,0,0,1\n-0.1,5,5,-1,0,0\n10,5,15,-1,0,0\n",
+    );
+    let flags = [
+        "sun",
+        "houses.obj",
+        "--sensors",
+        "points.csv",
+        "-o",
+        "all.csv",
+        "--groups",
+        "facades.csv",
+        "--by",
+        "facade",
+    ];
+    let run = place.run(&[&flags[..], &DAY].concat()).expect(0);
+    assert!(
+        run.stderr
+            .contains("warning: 1 of 3 points lie inside of bodies"),
+        "{}",
+        run.stderr
+    );
+    assert!(
+        !run.stderr.contains("two groups"),
+        "normals decide: {}",
+        run.stderr
+    );
+    let rows = table(&place, "facades.csv");
+    let counts: Vec<&str> = rows[1..]
+        .iter()
+        .filter(|row| row[3] != "0")
+        .map(|row| &*row[1])
+        .collect();
+    assert_eq!(counts, ["W", "W"], "{rows:?}");
+
+    // Without normals, an edge between two roofs of the same height belongs to nobody.
+    let even = semi_detached(false).replace(" 20\n", " 10\n");
+    place.write("houses.obj", even);
+    place.write("points.csv", "x,y,z\n10,5,10.5\n5,5,10.5\n");
+    let run = place.run(&[&flags[..], &DAY].concat()).expect(0);
+    assert!(
+        run.stderr
+            .contains("warning: 1 of 2 points lie on surfaces of two groups"),
+        "{}",
+        run.stderr
+    );
 }
 
 #[test]
