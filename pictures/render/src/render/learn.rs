@@ -39,6 +39,16 @@ pub struct Learned {
     pub logging: Duration,
 }
 
+impl Learned {
+    /// Nothing but training rays.
+    pub fn of(lesson: Option<Lesson>) -> Self {
+        Self {
+            lesson,
+            ..Self::default()
+        }
+    }
+}
+
 /// Figures of learning the final tree. Times are wall-clock.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LearningFigures {

@@ -43,7 +43,7 @@ use job::Job;
 pub use kept::{KeptTree, Sight, training_rays};
 pub use layers::Layers;
 pub use learn::LearningFigures;
-use learn::{first_tree, learn};
+use learn::{Learned, first_tree, learn};
 pub use monitor::{Monitor, Phase};
 pub use paths::{PathRays, PathTracer, Paths};
 pub use rounds::{Growth, Round, render_rounds};
@@ -124,11 +124,21 @@ fn render_here(
 ) -> Result<(Rendering, Snapshot), Error> {
     let (job, done, lesson) = Job::begin(world, options, task, monitor)?;
     monitor.progress(Phase::Build, 0, 1);
-    let (mut bvh, build_time) = first_tree(world, &options.recipe, monitor)?;
-    monitor.progress(Phase::Build, 1, 1);
-
-    let start = Instant::now();
-    let learned = learn(&job, options, &mut bvh, lesson.as_ref())?;
+    let mut start = Instant::now();
+    let ready = first_tree(world, &options.recipe, monitor).and_then(|(mut bvh, time)| {
+        monitor.progress(Phase::Build, 1, 1);
+        start = Instant::now();
+        let learned = learn(&job, options, &mut bvh, lesson.as_ref())?;
+        Ok((bvh, time, learned))
+    });
+    let (bvh, build_time, learned) = match ready {
+        // Whoever goes on later finds at least what this run has begun with.
+        Err(Error::Cancelled) => {
+            monitor.keep(job.snapshot(done, &Learned::of(lesson)));
+            return Err(Error::Cancelled);
+        }
+        ready => ready?,
+    };
     let sums = pass::run(&job, options, &bvh, &learned, done, None)?;
     let developing = Instant::now();
     let image = sums.film.image(world.film.resolution)?;

@@ -53,8 +53,8 @@ pub trait Monitor: Sync {
         false
     }
 
-    /// Hands over the state of the rendering: when wanted, and when the rendering is cancelled after its first
-    /// batch. The calling thread waits until the method returns, other threads go on.
+    /// Hands over the state of the rendering: when wanted, and when the rendering is cancelled, even while it builds and
+    /// learns. The calling thread waits until the method returns, other threads go on.
     fn keep(&self, snapshot: Snapshot) {
         let _ = snapshot;
     }

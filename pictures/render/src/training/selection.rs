@@ -27,14 +27,15 @@ const ENOUGH_SAMPLES: (f64, f64) = (1024.0, 4096.0);
 /// Largest share of a small picture that is taken to reach these numbers. The rest is left to profit.
 const ENOUGH_SHARE: f64 = 0.25;
 
-/// Most samples of a pre-pass: some seconds of work, which an interruption may cost, and 50 MB.
-const MOST: f64 = (1 << 22) as f64;
+/// Most samples of a pre-pass, whose work an interruption may cost: a second of a processor or two, and many times as many as
+/// there is to learn from.
+const MOST: f64 = (1 << 18) as f64;
 
 impl Selection {
     /// A `share` in 0..=1 of `pixels * spp` samples of about `rays` shadow rays each. `None` if the share is 0.
     ///
     /// A small share is raised to a few thousand samples or to a quarter of the picture, whichever is less. A large
-    /// share is lowered to 2²² samples.
+    /// share is lowered to 2¹⁸ samples.
     pub fn new(share: f64, rays: f64, pixels: usize, spp: u32, seed: u64) -> Option<Self> {
         let samples = pixels as f64 * f64::from(spp);
         let enough = (ENOUGH_RAYS / rays).clamp(ENOUGH_SAMPLES.0, ENOUGH_SAMPLES.1);
