@@ -52,8 +52,8 @@ const STEEP: f64 = 0.5;
 /// Most triangles of a body at which it is decided which way the body faces, and what is below it.
 const SAMPLES: usize = 16;
 
-/// The side of an open surface that sees more sky is the front if it sees so many times as much as the other one. A wall that
-/// stands free sees about the same from both sides, and keeps its own.
+/// The side of an open surface that sees more sky is the front if it sees so many times as much as the other one. A free
+/// wall sees about the same from both sides, and keeps its own.
 const MORE_SKY: f64 = 1.5;
 
 /// A sheet above another one is a roof only if the other one is so many times as large: terrain is measured in layers, too.
@@ -219,7 +219,7 @@ impl Surfaces {
     /// Which places of a mesh's triangles are covered: places on its surface, with the triangle that they are on.
     ///
     /// A place is covered if none of 577 directions to the sky is open, and if
-    /// - the first surface above or in front is nearer than `distance`, as that of a floor on the terrain or of the next house, or
+    /// - the first surface above or in front is nearer than `distance`, such as the floor of a house on the terrain, or the next house; or
     /// - more than half of what it sees are backs of surfaces, as inside of a house, whether that is closed or has gaps that no
     ///   ray finds.
     ///
@@ -266,10 +266,10 @@ impl Surfaces {
     }
 }
 
-/// Every how many of the directions to the sky tell what a place that sees none of it sees instead.
+/// Step by which directions are taken to find out what a place sees that sees no sky.
 const SOME: usize = 4;
 
-/// Every how many of the directions are tried first.
+/// Step by which directions are tried first.
 const FEW: usize = 32;
 
 /// Some rays, if none of them is open. Most places see the sky, and a few of the last rays, the steepest ones, find that out.

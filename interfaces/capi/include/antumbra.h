@@ -1046,7 +1046,8 @@ ANTUMBRA_API antumbra_status antumbra_world_quality(const antumbra_world *world,
  * a damaged or forged one is an error.
  *
  * Paths are bytes as the system takes them; on Windows they are UTF-8. A file is written under another name and renamed, so
- * there is never half of one. An existing file is replaced.
+ * there is never half of one. An existing file is replaced;
+ * a symbolic link stays and leads to the new file, and a device or a pipe is written to as it is.
  * ------------------------------------------------------------------------------------------------------------------------ */
 
 /* Functions that files cannot hold: one for each user geometry of which there is a primitive, and one for each mesh with an

@@ -1,9 +1,9 @@
 //! Trees, objects and worlds in files and in memory.
 
 use std::ffi::{CStr, c_char};
-use std::fs::{self, File};
-use std::io;
-use std::path::{Path, PathBuf};
+use std::fs::File;
+use std::io::{self, Write};
+use std::path::Path;
 
 use antumbra::{Bvh, Error, Object, World};
 
@@ -29,44 +29,25 @@ fn path_of(path: &CStr) -> Outcome<&Path> {
     Ok(Path::new(path))
 }
 
-/// Writes a file under another name first, so that there is never a part of one under this name.
-fn write_file(path: &Path, write: impl FnOnce(&File) -> Result<(), Error>) -> Outcome {
-    let mut beside = path.as_os_str().to_owned();
-    beside.push(format!(".{}.part", std::process::id()));
-    let beside = PathBuf::from(beside);
-    let written = (|| {
-        let file = File::create_new(&beside)?;
-        write(&file)?;
-        file.sync_all()?;
-        fs::rename(&beside, path)?;
-        Ok::<(), Error>(())
-    })();
-    written.map_err(|error| {
-        // A file that was there before is somebody else's.
-        let is_ours = !matches!(
-            error,
-            Error::Io {
-                kind: io::ErrorKind::AlreadyExists,
-                ..
-            }
-        );
-        if is_ours {
-            // There may be none, if it could not be made.
-            let _ = fs::remove_file(&beside);
-        }
-        Failure::from(error).about(&path.display().to_string())
-    })
+/// Writes a file as a whole or not at all.
+fn write_file(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<(), Error>) -> Outcome {
+    let mut failed = None;
+    let written = antumbra_files::write_file(path, |file| {
+        write(file).map_err(|error| {
+            let text = error.to_string();
+            failed = Some(error);
+            io::Error::other(text)
+        })
+    });
+    // Errors of the kernel say more than those of files that hold them.
+    let error = |error: io::Error| failed.unwrap_or(Error::from(error));
+    written.map_err(|source| Failure::from(error(source)).about(&path.display().to_string()))
 }
 
 /// Opens a file to read.
 fn open(path: &Path) -> Outcome<File> {
-    let failed =
-        |error: io::Error| Failure::from(Error::from(error)).about(&path.display().to_string());
-    let file = File::open(path).map_err(failed)?;
-    match file.metadata().map_err(failed)?.is_dir() {
-        true => Err(Failure::new(Status::Io, "a folder").about(&path.display().to_string())),
-        false => Ok(file),
-    }
+    let file = antumbra_files::open(path);
+    file.map_err(|error| Failure::from(Error::from(error)).about(&path.display().to_string()))
 }
 
 /// The four functions of a type.

@@ -1,6 +1,6 @@
 //! Files that the command line names as inputs, beside scenes.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
@@ -11,17 +11,15 @@ use crate::exit::Failure;
 /// A file that is open, and its length in bytes; `None` if there is none. Devices and pipes are refused: they may have no
 /// end, and a pipe waits for its writer.
 pub fn open(path: &Path) -> Result<Option<(File, u64)>, Failure> {
-    match fs::metadata(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        Ok(metadata) if !metadata.is_file() => return Err(no_file(path)),
-        found => found.map_err(|error| unread(path, &error))?,
-    };
-    let file = File::open(path).map_err(|error| unread(path, &error))?;
-    // Of the open file: the name may lead to another one by now.
-    let metadata = file.metadata().map_err(|error| unread(path, &error))?;
-    match metadata.is_file() {
-        true => Ok(Some((file, metadata.len()))),
-        false => Err(no_file(path)),
+    let length = |file: File| Ok::<_, io::Error>(Some((file.metadata()?.len(), file)));
+    match antumbra_files::open(path).and_then(length) {
+        Ok(found) => Ok(found.map(|(length, file)| (file, length))),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
+        // Of this kind are names of devices, pipes and folders.
+        Err(error) if error.kind() == ErrorKind::Other => {
+            Err(Failure::Data(format!("{}: {error}", path.display())))
+        }
+        Err(error) => Err(unread(path, &error)),
     }
 }
 
@@ -61,11 +59,4 @@ pub fn check_memory(path: &Path, needed: u64) -> Result<(), Failure> {
 /// The failure to read a file.
 pub fn unread(path: &Path, error: &io::Error) -> Failure {
     Failure::Work(format!("cannot read {}: {error}", path.display()))
-}
-
-fn no_file(path: &Path) -> Failure {
-    Failure::Data(format!(
-        "{} is no regular file, and may have no end",
-        path.display()
-    ))
 }

@@ -226,8 +226,8 @@ pub fn beside(output: &Path, suffix: &str) -> Option<PathBuf> {
     Some(name.into())
 }
 
-/// Refuses to replace a file that the command line does not name, unless this program wrote it.
-pub fn check_own(path: &Path) -> Result<(), Failure> {
+/// Refuses to replace a file that the command line does not name, unless this program wrote it. `remedy` is what helps then.
+pub fn check_own(path: &Path, remedy: &str) -> Result<(), Failure> {
     let ours = match fs::metadata(path) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
         Ok(found) if !found.is_file() => false,
@@ -238,9 +238,21 @@ pub fn check_own(path: &Path) -> Result<(), Failure> {
         return Ok(());
     }
     Err(Failure::Usage(format!(
-        "{} exists, and antumbra did not write it; name an output with -o, or give --overwrite",
+        "{} exists, and antumbra did not write it; {remedy}",
         path.display()
     )))
+}
+
+/// Refuses to replace a file beside a picture unless the picture is there, and of this program: then the file is, too.
+pub fn check_beside(picture: &Path, path: &Path) -> Result<(), Failure> {
+    match path.exists() && !is_our_picture(picture).unwrap_or(false) {
+        true => Err(Failure::Usage(format!(
+            "{} exists, and would be written beside {}; give the picture another name",
+            path.display(),
+            picture.display()
+        ))),
+        false => Ok(()),
+    }
 }
 
 /// Checks that so many bytes have room beside `path`, as far as the system reports it.

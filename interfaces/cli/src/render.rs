@@ -169,7 +169,7 @@ fn read(
             files.writes("the image", &path)?;
             declare_beside(&path, args, files)?;
             if !args.overwrite {
-                output::check_own(&path)?;
+                output::check_own(&path, "name an output with -o, or give --overwrite")?;
             }
             path
         }
@@ -313,7 +313,7 @@ fn declare_beside(output: &Path, args: &RenderArgs, files: &mut Files) -> Result
         return Err(Failure::Usage(reason));
     };
     files.writes("--preview", &path)?;
-    output::check_own(&path)
+    output::check_own(&path, "take --preview or the file away")
 }
 
 /// The state to go on from: a finished picture of fewer samples is extended. `None` if it cannot be.

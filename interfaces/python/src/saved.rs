@@ -40,12 +40,12 @@ pub fn save(scene: &SceneData, path: &Path) -> PyResult<()> {
 }
 
 pub fn load(path: &Path) -> PyResult<Arc<SceneData>> {
-    // Checked before opening: a device has no end, and a pipe waits for its writer.
-    let regular = || match std::fs::metadata(path)?.is_file() {
-        true => std::fs::read(path),
-        false => Err(std::io::Error::other("not a regular file")),
+    let read = || {
+        let mut bytes = Vec::new();
+        std::io::Read::read_to_end(&mut antumbra_files::open(path)?, &mut bytes)?;
+        Ok(bytes)
     };
-    let bytes = regular().map_err(|error| {
+    let bytes: Vec<u8> = read().map_err(|error: std::io::Error| {
         let text = format!("{}: {error}", path.display());
         match error.kind() {
             std::io::ErrorKind::NotFound => pyo3::exceptions::PyFileNotFoundError::new_err(text),

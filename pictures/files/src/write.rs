@@ -19,8 +19,6 @@ use std::path::{Path, PathBuf};
 
 use tempfile::{NamedTempFile, TempPath};
 
-use crate::Error;
-
 /// Replaces a file as a whole or not at all.
 ///
 /// `write` fills a buffered temporary file in the directory of `path`. The temporary file is synced to the disk and
@@ -31,44 +29,38 @@ use crate::Error;
 /// directory are refused. Devices, pipes and standard streams are written to directly.
 ///
 /// # Errors
-/// [`Error::Write`], also when `write` itself fails.
-pub fn atomic_write(
-    path: impl AsRef<Path>,
+/// Of the system, or of `write` itself.
+pub fn write_file(
+    path: &Path,
     write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), Error> {
-    let path = path.as_ref();
-    let written = Target::of(path).and_then(|target| match target {
+) -> io::Result<()> {
+    match Target::of(path)? {
         Target::File(file) => replace(&file, |file| write(file)),
         stream => write_to_stream(&stream, write),
-    });
-    written.map_err(|source| Error::Write {
-        path: path.to_path_buf(),
-        source,
-    })
+    }
 }
 
 /// Output in which a writer can go back, as formats with tables at the front need.
-pub(crate) trait Output: Write + Seek {}
+pub trait Output: Write + Seek {}
 
 impl<T: Write + Seek + ?Sized> Output for T {}
 
-/// As [`atomic_write`], for writers that go back. The contents of a stream are kept in memory until they are complete.
-pub(crate) fn atomic_write_seeking(
+/// As [`write_file`], for writers that go back. The contents of a stream are kept in memory until they are complete.
+///
+/// # Errors
+/// As [`write_file`].
+pub fn write_file_seeking(
     path: &Path,
     write: impl FnOnce(&mut dyn Output) -> io::Result<()>,
-) -> Result<(), Error> {
-    let written = Target::of(path).and_then(|target| match target {
+) -> io::Result<()> {
+    match Target::of(path)? {
         Target::File(file) => replace(&file, write),
         stream => {
             let mut bytes = Cursor::new(Vec::new());
             write(&mut bytes)?;
             write_to_stream(&stream, |stream| stream.write_all(bytes.get_ref()))
         }
-    });
-    written.map_err(|source| Error::Write {
-        path: path.to_path_buf(),
-        source,
-    })
+    }
 }
 
 /// Writes to a target that is no regular file, or appends to one.

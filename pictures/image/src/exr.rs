@@ -17,7 +17,8 @@ use ::exr::prelude::{
     WritableImage, read,
 };
 
-use crate::atomic::Output;
+use antumbra_files::Output;
+
 use crate::error::Unwritten;
 use crate::foreign::contained;
 use crate::memory::Claim;

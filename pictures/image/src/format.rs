@@ -3,7 +3,9 @@
 use std::io;
 use std::path::Path;
 
-use crate::atomic::{Output, atomic_write_seeking};
+use antumbra_files::Output;
+
+use crate::atomic::atomic_write_seeking;
 use crate::error::Unwritten;
 use crate::memory::{self, Allowance, Claim, Unread};
 use crate::{Channel, Error, Image, Notes, Raster, Rgb8Image, Target, decode, pfm};

@@ -136,7 +136,10 @@ pub(crate) fn declare_integrator(
         for (name, types) in OF_OTHER_INTEGRATORS {
             let _ = lookup.find(name, types);
         }
-        let message = format!("integrator {:?} is taken as {taken_as:?}", kind.text);
+        let message = format!(
+            "integrator {:?} is taken as {taken_as:?}: caustics of point, spot and distant lights are missing",
+            kind.text
+        );
         report.note(kind.span, message);
     }
     let integrator = match kind.text.as_str() {

@@ -1,4 +1,9 @@
 /* Objects, instances, worlds, refits, learning and files. */
+#define _POSIX_C_SOURCE 200809L
+
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include "check.h"
 
 enum { RAYS = 4000, INSTANCES = 60 };
@@ -89,6 +94,7 @@ int main(int argc, char **argv) {
     antumbra_batch batch;
     char path[1024];
     FILE *file;
+    struct stat status;
 
     CHECK(argc == 2);
     transforms();
@@ -284,7 +290,17 @@ int main(int argc, char **argv) {
     snprintf(path, sizeof path, "%s/there/is/no/such/folder", argv[1]);
     FAILS(antumbra_bvh_load(path, NULL, &loaded), ANTUMBRA_IO, path);
     FAILS(antumbra_bvh_save(fixed, path), ANTUMBRA_IO, path);
-    FAILS(antumbra_bvh_load(argv[1], NULL, &loaded), ANTUMBRA_IO, "folder");
+    FAILS(antumbra_bvh_load(argv[1], NULL, &loaded), ANTUMBRA_IO, "no regular file");
+    /* A link stays, and a pipe would be waited for. */
+    snprintf(path, sizeof path, "%s/link.antumbra", argv[1]);
+    CHECK(symlink("tree.antumbra", path) == 0);
+    OK(antumbra_bvh_save(fixed, path));
+    CHECK(lstat(path, &status) == 0 && S_ISLNK(status.st_mode));
+    OK(antumbra_bvh_load(path, NULL, &loaded));
+    antumbra_bvh_free(loaded);
+    snprintf(path, sizeof path, "%s/pipe", argv[1]);
+    CHECK(mkfifo(path, 0600) == 0);
+    FAILS(antumbra_bvh_load(path, NULL, &loaded), ANTUMBRA_IO, "no regular file");
     FAILS(antumbra_bvh_save(fixed, argv[1]), ANTUMBRA_IO, argv[1]);
 
     /* A tree alone: learned, refitted, and one that does not fit. */

@@ -10,7 +10,7 @@ use super::map;
 use super::sun::Baked;
 use crate::exit::Failure;
 use crate::interrupt;
-use crate::output::Files;
+use crate::output::{self, Files};
 
 /// Most maps of a command. A day in steps of a minute has fewer.
 const MOST: usize = 1500;
@@ -62,7 +62,9 @@ pub fn declare(path: &Path, sunlight: &Sunlight, files: &mut Files) -> Result<()
         return Ok(());
     }
     for number in 1..=count {
-        files.writes("--frames", &numbered(path, number))?;
+        let map = numbered(path, number);
+        output::check_own(&map, "choose another name for --frames")?;
+        files.writes("--frames", &map)?;
     }
     files.check()
 }

@@ -74,10 +74,15 @@ fn extension(path: &Path) -> String {
     extension.to_string_lossy().to_ascii_lowercase()
 }
 
-/// World files of the maps among these outputs.
-pub fn world_files(outputs: &[PathBuf]) -> Vec<PathBuf> {
+/// World files of the maps among these outputs. Nobody named them, so another one is not replaced.
+pub fn world_files(outputs: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let maps = outputs.iter().filter(|path| has_world_file(path));
-    maps.map(|path| path.with_extension("pgw")).collect()
+    let beside = |map: &PathBuf| {
+        let path = map.with_extension("pgw");
+        output::check_beside(map, &path)?;
+        Ok(path)
+    };
+    maps.map(beside).collect()
 }
 
 /// A sheet on which values of a grid are drawn.
@@ -340,6 +345,6 @@ mod tests {
     fn only_png_files_have_world_files() {
         let outputs = ["a.png", "b.svg", "c.PDF", "d.csv", "e.PNG"].map(PathBuf::from);
         let wanted = ["a.pgw", "e.pgw"].map(PathBuf::from);
-        assert_eq!(world_files(&outputs), wanted);
+        assert_eq!(world_files(&outputs).expect("free names"), wanted);
     }
 }

@@ -140,7 +140,7 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
         ("--along", args.places.placement.along.as_deref()),
         ("--epw", args.epw.as_deref()),
     ];
-    let world_files = map::world_files(&args.output);
+    let world_files = map::world_files(&args.output)?;
     let mut written = vec![
         ("--hourly", args.hourly.as_deref()),
         ("--groups", args.groups.as_deref()),

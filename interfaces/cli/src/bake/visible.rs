@@ -209,7 +209,7 @@ pub fn run(
     };
     let from = ("the points", Some(args.from.as_path()));
     let to = ("the points", args.to.as_deref());
-    let world_files = map::world_files(&args.output);
+    let world_files = map::world_files(&args.output)?;
     let mut written = vec![("--lines", args.lines.as_deref())];
     written.extend(
         world_files

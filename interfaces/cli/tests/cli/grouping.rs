@@ -461,6 +461,20 @@ fn shadows_move_in_one_file_or_in_many() {
     let clash = ["--frames", "day.png", "-o", "day-0003.png"];
     let run = place.run(&[&flags[..], &clash, &times, day].concat());
     assert!(run.stderr.contains("two outputs"), "{}", run.stderr);
+    // Nor do they, or a world file, replace what somebody else wrote; again the same is no stranger.
+    place
+        .run(&[&flags[..], &["--frames", "day.png"], &times, day].concat())
+        .expect(0);
+    for (stranger, output) in [
+        ("own-0002.png", ["--frames", "own.png"]),
+        ("map.pgw", ["-o", "map.png"]),
+    ] {
+        place.write(stranger, "mine");
+        let run = place.run(&[&flags[..], &output, &times, day].concat());
+        assert!(run.expect(2).stderr.contains(stranger), "{stranger}");
+        let text = fs::read(place.path(stranger)).expect("a file");
+        assert_eq!(text, b"mine");
+    }
     place
         .run(&[&flags[..], &["--frames", "day.mp4"], &times, day].concat())
         .expect(2);
