@@ -273,6 +273,10 @@ impl Job for FieldHorizonJob<'_> {
         self.observers.len()
     }
 
+    fn answer_bytes(&self) -> u64 {
+        4 * self.azimuths.len() as u64
+    }
+
     fn rays_per_item(&self) -> u64 {
         self.azimuths.len() as u64
     }

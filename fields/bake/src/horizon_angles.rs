@@ -163,6 +163,10 @@ impl Job for HorizonJob {
         self.places.points.len()
     }
 
+    fn answer_bytes(&self) -> u64 {
+        4 * self.azimuths.len() as u64
+    }
+
     fn rays_per_item(&self) -> u64 {
         (self.azimuths.len() * (LEVELS + HALVINGS)) as u64
     }

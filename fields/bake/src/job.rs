@@ -24,6 +24,9 @@ pub trait Job: Sync {
     /// Number of rays of one item, about.
     fn rays_per_item(&self) -> u64;
 
+    /// Least bytes of the answer of one item. All answers of a job are kept until its end.
+    fn answer_bytes(&self) -> u64;
+
     /// Adds everything that answers depend on, except the geometry.
     fn identify(&self, key: &mut Key);
 

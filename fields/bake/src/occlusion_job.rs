@@ -58,6 +58,10 @@ impl Job for OcclusionJob {
         self.places.points.len()
     }
 
+    fn answer_bytes(&self) -> u64 {
+        if self.bent_normals { 16 } else { 4 }
+    }
+
     fn rays_per_item(&self) -> u64 {
         let sides = if self.options.two_sided { 2 } else { 1 };
         sides * u64::from(self.options.samples)

@@ -438,6 +438,10 @@ impl Job for SunJob<'_> {
         self.places.points.len()
     }
 
+    fn answer_bytes(&self) -> u64 {
+        8 * self.directions.len().div_ceil(64) as u64
+    }
+
     fn rays_per_item(&self) -> u64 {
         self.directions.len() as u64
     }

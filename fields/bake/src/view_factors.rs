@@ -110,6 +110,10 @@ impl Job for ViewFactorJob<'_> {
         self.surfaces.len()
     }
 
+    fn answer_bytes(&self) -> u64 {
+        8 * self.width() as u64
+    }
+
     fn rays_per_item(&self) -> u64 {
         self.samples.into()
     }

@@ -135,6 +135,11 @@ impl Job for ViewshedJob<'_> {
         self.observers.len()
     }
 
+    fn answer_bytes(&self) -> u64 {
+        // Runs of cells; one that sees nothing has the least.
+        8
+    }
+
     fn rays_per_item(&self) -> u64 {
         self.field.heights().len() as u64
     }

@@ -67,6 +67,10 @@ impl Job for VisibilityJob<'_> {
         self.rows.points.len()
     }
 
+    fn answer_bytes(&self) -> u64 {
+        8 * self.columns().points.len().div_ceil(64) as u64
+    }
+
     fn rays_per_item(&self) -> u64 {
         self.columns().points.len() as u64
     }

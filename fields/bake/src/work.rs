@@ -154,6 +154,14 @@ impl<'a, J: Job> Work<'a, J> {
         Ok(true)
     }
 
+    /// Memory in bytes that the answers of the share take at least, and again as much to make a result of them if the share is
+    /// the whole.
+    pub fn memory(&self) -> u64 {
+        let [_, items] = self.progress();
+        let copies = if self.identity.shard[1] > 1 { 1 } else { 2 };
+        (items as u64).saturating_mul(copies * self.job.answer_bytes())
+    }
+
     /// Size in bytes of what [`write`](Self::write) writes, about.
     pub fn bytes(&self) -> u64 {
         let answers = self
@@ -236,6 +244,10 @@ mod tests {
 
         fn items(&self) -> usize {
             5
+        }
+
+        fn answer_bytes(&self) -> u64 {
+            8
         }
 
         fn rays_per_item(&self) -> u64 {

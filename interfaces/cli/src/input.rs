@@ -56,6 +56,19 @@ pub fn check_memory(path: &Path, needed: u64) -> Result<(), Failure> {
     )))
 }
 
+/// Refuses a job whose answers need more memory than is left, before the first of them is computed.
+pub fn check_answers(name: &str, needed: u64) -> Result<(), Failure> {
+    let left = antumbra_guard::limit().saturating_sub(antumbra_guard::taken());
+    if needed <= left {
+        return Ok(());
+    }
+    let [needed, left] = [needed, left].map(MemorySize::new);
+    Err(Failure::Data(format!(
+        "{name}: the answers take about {needed} of memory, and {left} are left; take fewer points, share the work with --shard, or \
+         allow more with --max-memory"
+    )))
+}
+
 /// The failure to read a file.
 pub fn unread(path: &Path, error: &io::Error) -> Failure {
     Failure::Work(format!("cannot read {}: {error}", path.display()))

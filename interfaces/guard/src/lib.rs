@@ -50,6 +50,11 @@ pub fn limit() -> u64 {
     }
 }
 
+/// Bytes that the process has allocated and not freed, of which the system may have given fewer.
+pub fn taken() -> u64 {
+    ASKED.load(Ordering::Relaxed) as u64
+}
+
 /// The system's allocator with a limit, for `#[global_allocator]`.
 ///
 /// The process exits with a message when its resident memory would pass the limit of [`set_limit`] by more than some

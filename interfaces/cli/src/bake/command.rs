@@ -16,7 +16,7 @@ use crate::exit::{Failure, tell};
 use crate::json::Destination;
 use crate::output::Files;
 use crate::progress::Progress;
-use crate::{scenes, version};
+use crate::{input, scenes, version};
 
 /// Arguments that all bakes have.
 pub struct Bake<'a> {
@@ -109,6 +109,7 @@ impl Bake<'_> {
         let shard = self.chunks.shard;
         let share = shard.map_or([0, 1], |shard| [shard.index(), shard.count()]);
         let mut work = Work::new(job, key, share, std::env::args_os().collect());
+        input::check_answers(name, work.memory())?;
         let start = Instant::now();
         let progress = Progress::new(name);
         let checkpoint = match self.parts {

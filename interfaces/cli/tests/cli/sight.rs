@@ -259,3 +259,34 @@ fn what_cannot_be_meant_is_refused() {
     }
     assert_eq!(place.files(), files);
 }
+
+#[test]
+fn answers_that_have_no_room_are_refused_before_the_first_ray() {
+    let place = place();
+    let points: String = (0..30_000)
+        .map(|i| format!("{},0,1\n", i as f32 * 1e-4))
+        .collect();
+    place.write("many.csv", format!("x,y,z\n{points}"));
+    let flags = [
+        "visible",
+        "wall.obj",
+        "many.csv",
+        "-o",
+        "seen.npz",
+        "--max-memory",
+        "128M",
+    ];
+    let begin = std::time::Instant::now();
+    let run = place.run(&flags).expect(65);
+    assert!(
+        run.stderr.contains("the answers take about 2"),
+        "{}",
+        run.stderr
+    );
+    // All lines of sight take minutes.
+    assert!(begin.elapsed().as_secs() < 30);
+    assert!(
+        !place.files().iter().any(|name| name.contains("seen")),
+        "nothing is left"
+    );
+}
