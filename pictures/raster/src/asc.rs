@@ -24,6 +24,7 @@ pub fn read(
     check: impl Fn([usize; 2]) -> Result<(), String>,
 ) -> Result<Raster, String> {
     let text = std::str::from_utf8(bytes).map_err(|_| "it is no text")?;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut lines = (1..).zip(text.lines()).peekable();
     let mut header = Header::default();
     while let Some((line, text)) = lines.peek() {
@@ -56,7 +57,9 @@ pub fn read(
             if values.len() == count {
                 return Err(format!("line {line}: found more than {count} values"));
             }
-            let is_data = value.is_finite() && Some(value) != header.no_data;
+            // Marks may have fewer digits than values.
+            let is_mark = |mark: f64| value == mark || value as f32 == mark as f32;
+            let is_data = value.is_finite() && !header.no_data.is_some_and(is_mark);
             values.push(if is_data { value } else { f64::NAN });
         }
     }
@@ -91,8 +94,10 @@ impl Header {
             "cellsize" => self.cell = [Some(number()?); 2],
             "dx" => self.cell[0] = Some(number()?),
             "dy" => self.cell[1] = Some(number()?),
-            // A NaN as the mark needs none.
-            "nodata_value" | "nodata" => self.no_data = text.parse().ok(),
+            "nodata_value" | "nodata" => match text.parse() {
+                Ok(mark) => self.no_data = Some(mark),
+                Err(_) => return Err(format!("{key}: found `{text}`, wanted a number")),
+            },
             _ => return Err(format!("`{key}` is no key of an ESRI ASCII grid")),
         }
         Ok(())
@@ -184,6 +189,8 @@ mod tests {
         let centres = HEAD.replace("xllcorner 100", "xllcenter 105");
         let same = text(&format!("{centres}1 2 3 4 5 6")).expect("a raster");
         assert_eq!(same.grid, raster.grid);
+        let marked = text(&format!("\u{feff}{HEAD}1 2 -1 4 nan 6.5")).expect("a byte order mark");
+        assert_eq!(marked.grid, raster.grid);
         let values: Vec<f32> = raster.values.iter().map(|&x| x as f32).collect();
         let again = write(&raster.grid, &values).expect("square cells");
         let again = read(&again, |_| Ok(())).expect("a raster");
@@ -203,6 +210,10 @@ mod tests {
             (HEAD.replace("NCOLS 3\n", ""), "no ncols"),
             (HEAD.replace("cellsize 10", "cellsize 0"), "lengths above 0"),
             (HEAD.replace("cellsize", "cell"), "line 5: `cell`"),
+            (
+                HEAD.replace("-1\n", "-9999,0\n"),
+                "line 6: nodata_value: found `-9999,0`",
+            ),
         ] {
             let error = text(&given).expect_err(&given);
             assert!(error.contains(word), "{error}");

@@ -1,63 +1,62 @@
-//! GeoTIFF: the crate `tiff` reads and writes the pixels, tags of places are ours (OGC 19-008r4, GeoTIFF 1.1).
+//! GeoTIFF: the crate `tiff` reads tags and writes files, tags of places are ours (OGC 19-008r4, GeoTIFF 1.1).
 
 use std::io::Cursor;
 
-use tiff::ColorType;
-use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::Directory;
+use tiff::decoder::ifd::Value;
+use tiff::decoder::{Decoder, Limits};
 use tiff::encoder::colortype::Gray32Float;
 use tiff::encoder::compression::DeflateLevel;
 use tiff::encoder::{Compression, TiffEncoder};
 use tiff::tags::Tag;
 
 use crate::grid::check_transform;
+use crate::npy::WorldFile;
+use crate::pixels::{Bytes, Page};
 use crate::{Crs, Grid, Memory, Quantity, Raster};
 
 /// Notes of GDAL as XML: scale and offset of values, their names and units.
 const GDAL_METADATA: u16 = 42_112;
 
-/// Reads a file of one band. `world_file` says where the cells are if the file does not.
+/// What may lie beside a file.
+pub struct Beside<'a> {
+    /// Says where the cells are if the file does not.
+    pub world_file: WorldFile<'a>,
+    /// A mask of the cells with data, as GDAL writes it.
+    pub mask: &'a dyn Fn() -> Result<Option<Vec<u8>>, String>,
+}
+
+/// Reads a file of one band.
 pub fn read(
     bytes: &[u8],
-    world_file: &dyn Fn() -> Result<Option<[f64; 6]>, String>,
+    beside: &Beside<'_>,
     check: impl Fn([usize; 2]) -> Result<(), String>,
 ) -> Result<Raster, String> {
-    let text = |error: tiff::TiffError| error.to_string();
-    let decoder = Decoder::new(Cursor::new(bytes)).map_err(text)?;
-    // Sizes are checked before the pixels are read.
-    let mut limits = Limits::unlimited();
-    limits.ifd_value_size = bytes.len();
-    let mut decoder = decoder.with_limits(limits);
-    let (width, height) = decoder.dimensions().map_err(text)?;
-    let size = [width as usize, height as usize];
-    check(size)?;
-    match decoder.colortype().map_err(text)? {
-        ColorType::Gray(8 | 16 | 32 | 64) => {}
-        other => {
-            return Err(format!(
-                "found pixels of {other:?}, wanted one band of numbers"
-            ));
-        }
-    }
+    let (mut decoder, directory, inner) = pages(bytes)?;
+    let page = Page::new(bytes, &mut decoder, &directory, &check)?;
+    let [width, height] = page.size;
     let crs = crs(&mut decoder);
     let transform = match transform(&mut decoder, crs.as_ref())? {
         Some(transform) => transform,
-        None => world_file()?.ok_or(
+        None => (beside.world_file)()?.ok_or(
             "it says nowhere where it is; wanted tags of GeoTIFF, or a world file of the same name with the extension .tfw",
         )?,
     };
-    let no_data: Option<f64> =
-        string(&mut decoder, Tag::GdalNodata).and_then(|text| text.trim().parse().ok());
+    let no_data = match string(&mut decoder, Tag::GdalNodata)
+        .as_deref()
+        .map(str::trim)
+    {
+        None | Some("") => None,
+        Some(text) => Some(text.parse::<f64>().map_err(|_| {
+            format!("its mark of cells without data (tag GDAL_NODATA) is `{text}`, wanted a number")
+        })?),
+    };
     let notes = string(&mut decoder, Tag::Unknown(GDAL_METADATA)).unwrap_or_default();
     let [scale, offset] = scale_and_offset(&notes)?;
-    let pixels = decoder.read_image().map_err(text)?;
-    let mut values = numbers(pixels);
-    if values.len() != size[0] * size[1] {
-        let found = values.len();
-        return Err(format!("found {found} pixels, wanted {width} x {height}"));
-    }
+    let mut values = page.values(no_data.unwrap_or(0.0))?;
     for value in &mut values {
-        // Marks are written with fewer digits than the pixels have.
-        let is_mark = |mark: f64| *value == mark || *value as f32 == mark as f32;
+        // Marks of floats are written with fewer digits than the pixels have.
+        let is_mark = |mark: f64| *value == mark || page.is_float() && *value as f32 == mark as f32;
         let is_data = value.is_finite() && !no_data.is_some_and(is_mark);
         *value = if is_data {
             scale * *value + offset
@@ -65,10 +64,38 @@ pub fn read(
             f64::NAN
         };
     }
+    let outer;
+    let masked = match inner {
+        Some(directory) => Some(Page::new(bytes, &mut decoder, &directory, &check)?),
+        None => match (beside.mask)()? {
+            Some(bytes) => {
+                outer = bytes;
+                let (mut decoder, directory, _) = pages(&outer)?;
+                Some(Page::new(&outer, &mut decoder, &directory, &check)?)
+            }
+            None => None,
+        },
+    };
+    if let Some(mask) = masked {
+        if mask.size != page.size {
+            let [columns, rows] = mask.size;
+            return Err(format!(
+                "its mask has {columns} x {rows} cells, wanted {width} x {height}"
+            ));
+        }
+        let mask = mask
+            .values(0.0)
+            .map_err(|reason| format!("mask: {reason}"))?;
+        for (value, mask) in values.iter_mut().zip(mask) {
+            if mask == 0.0 {
+                *value = f64::NAN;
+            }
+        }
+    }
     Ok(Raster {
         grid: Grid {
-            width: size[0],
-            height: size[1],
+            width,
+            height,
             transform: check_transform(transform)?,
             crs,
         },
@@ -76,8 +103,40 @@ pub fn read(
     })
 }
 
-/// Decoder of bytes in memory.
-type Bytes<'a> = Decoder<Memory<&'a [u8]>>;
+/// A decoder of tags, the directory of the first page, and the directory of its mask.
+fn pages(bytes: &[u8]) -> Result<(Bytes<'_>, Directory, Option<Directory>), String> {
+    let text = |error: tiff::TiffError| error.to_string();
+    let decoder = Decoder::new(Cursor::new(bytes)).map_err(text)?;
+    let mut limits = Limits::unlimited();
+    // A list of a tag has no more values than the file has bytes.
+    limits.ifd_value_size = bytes.len();
+    limits.decoding_buffer_size = bytes.len() * size_of::<Value>();
+    let mut decoder = decoder.with_limits(limits);
+    let start = decoder.ifd_pointer().ok_or("it has no page")?;
+    let first = decoder.read_directory(start).map_err(text)?;
+    let mut next = first.next();
+    // As GDAL, which looks at no more either: a longer chain runs in a circle.
+    for _ in 0..MOST_PAGES {
+        let Some(place) = next.filter(|place| place.0 != start.0) else {
+            break;
+        };
+        let page = decoder.read_directory(place).map_err(text)?;
+        let mut tags = decoder.read_directory_tags(&page);
+        let kind = tags.find_tag_unsigned::<u32>(Tag::NewSubfileType);
+        // A mask of the first page, and no overview of one.
+        if kind
+            .map_err(text)?
+            .is_some_and(|kind| kind & 0b101 == 0b100)
+        {
+            return Ok((decoder, first, Some(page)));
+        }
+        next = page.next();
+    }
+    Ok((decoder, first, None))
+}
+
+/// Most pages that are searched for a mask.
+const MOST_PAGES: usize = 4096;
 
 fn string(decoder: &mut Bytes<'_>, tag: Tag) -> Option<String> {
     let text = decoder.get_tag_ascii_string(tag).ok()?;
@@ -138,25 +197,6 @@ fn scale_and_offset(notes: &str) -> Result<[f64; 2], String> {
         number.ok_or_else(|| format!("{role}: found `{text}`, wanted a number"))
     };
     Ok([item("scale", 1.0)?, item("offset", 0.0)?])
-}
-
-fn numbers(pixels: DecodingResult) -> Vec<f64> {
-    fn all<T: Into<f64>>(list: Vec<T>) -> Vec<f64> {
-        list.into_iter().map(Into::into).collect()
-    }
-    match pixels {
-        DecodingResult::U8(list) => all(list),
-        DecodingResult::U16(list) => all(list),
-        DecodingResult::U32(list) => all(list),
-        DecodingResult::U64(list) => list.into_iter().map(|x| x as f64).collect(),
-        DecodingResult::I8(list) => all(list),
-        DecodingResult::I16(list) => all(list),
-        DecodingResult::I32(list) => all(list),
-        DecodingResult::I64(list) => list.into_iter().map(|x| x as f64).collect(),
-        DecodingResult::F16(list) => list.into_iter().map(|x| x.to_f64()).collect(),
-        DecodingResult::F32(list) => all(list),
-        DecodingResult::F64(list) => list,
-    }
 }
 
 /// Writes one band.
@@ -241,7 +281,7 @@ mod tests {
         for crs in systems {
             for transform in [
                 [600_000.0, 10.0, 0.0, 5_340_000.0, 0.0, -10.0],
-                [600_000.0, 10.0, 0.0, 5_340_000.0, 0.0, 5.0],
+                [600_000.0, 10.0, 0.0, 5_340_000.0, 0.0, -5.0],
                 [600_000.0, 7.0, 3.0, 5_340_000.0, 3.0, -7.0],
             ] {
                 let grid = Grid {
@@ -282,7 +322,37 @@ mod tests {
             .expect("a picture");
         let error = Raster::from_geotiff(plain.get_ref()).expect_err("no place");
         assert!(error.contains(".tfw"), "{error}");
-        let placed = read(plain.get_ref(), &|| Ok(Some(grid.transform)), |_| Ok(()));
+        let beside = Beside {
+            world_file: &|| Ok(Some(grid.transform)),
+            mask: &|| Ok(None),
+        };
+        let placed = read(plain.get_ref(), &beside, |_| Ok(()));
         assert_eq!(placed.expect("a raster").grid, grid);
+    }
+
+    /// Damaged files are errors or other numbers, and never a panic or much memory.
+    #[test]
+    fn damaged_files_of_gdal_are_refused() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/rasters");
+        let beside = Beside {
+            world_file: &|| Ok(None),
+            mask: &|| Ok(None),
+        };
+        let check = |size| crate::grid::check_size(size, 1 << 16);
+        let (mut state, mut refused) = (1_u64, 0);
+        for entry in std::fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("a file").path();
+            if path.extension().is_none_or(|extension| extension != "tif") {
+                continue;
+            }
+            let whole = std::fs::read(&path).expect("a file");
+            for place in 0..whole.len() {
+                let mut bytes = whole.clone();
+                state = state.wrapping_mul(6_364_136_223_846_793_005) | 1;
+                bytes[place] ^= 1 << (state >> 61);
+                refused += usize::from(read(&bytes, &beside, check).is_err());
+            }
+        }
+        assert!(refused > 1000, "{refused} files are refused");
     }
 }

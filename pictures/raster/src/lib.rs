@@ -16,7 +16,7 @@
 //! ```
 //!
 //! - `grid`: where the cells are;  `mesh`: cells as triangles
-//! - `geotiff`, `asc`, `npy`: one format each;  `crs`: coordinate systems as GeoTIFF describes them
+//! - `geotiff`, `asc`, `npy`: one format each;  `pixels`: strips and tiles of a TIFF;   `crs`: coordinate systems as GeoTIFF describes them
 #![forbid(unsafe_code)]
 
 mod asc;
@@ -25,12 +25,14 @@ mod geotiff;
 mod grid;
 mod mesh;
 mod npy;
+mod pixels;
 
 use std::fs::{self, File};
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 pub use crs::Crs;
+use geotiff::Beside;
 pub use grid::{Grid, RasterCells};
 pub use mesh::RasterMesh;
 
@@ -83,9 +85,11 @@ const PER_CELL: u64 = 8 + 12 + 12 + 24 + 8;
 ///
 /// | format | values | georeference |
 /// |---|---|---|
-/// | `.tif`, `.tiff` | one band of numbers; the nodata value, scale and offset that GDAL notes | tags of GeoTIFF, or a world file (`.tfw` or `.wld`) |
+/// | `.tif`, `.tiff` | one band of numbers; the nodata value, scale and offset that GDAL notes; a mask in the file or beside it (`.tif.msk`) | tags of GeoTIFF, or a world file (`.tfw` or `.wld`) |
 /// | `.asc` | numbers, `NODATA_value` | header |
 /// | `.npy` | two dimensions of numbers; NaN is no data | a world file (`.wld`) |
+///
+/// Rows come back from north to south and columns from west to east, unless the raster is turned or sheared.
 ///
 /// A `.prj` file beside an `.asc`, a `.npy` or a plain `.tif` says whether its coordinates are degrees.
 ///
@@ -100,12 +104,19 @@ pub fn read(path: &Path, max_bytes: u64) -> Result<Raster, Error> {
     let room = (max_bytes - bytes.len() as u64) / PER_CELL;
     let check = |[width, height]: [usize; 2]| grid::check_size([width, height], room);
     let mut raster = match extension(path).as_str() {
-        "tif" | "tiff" => geotiff::read(&bytes, &|| world_file(path, &["tfw", "wld"]), check),
+        "tif" | "tiff" => {
+            let beside = Beside {
+                world_file: &|| world_file(path, &["tfw", "wld"]),
+                mask: &|| mask(path, max_bytes),
+            };
+            geotiff::read(&bytes, &beside, check)
+        }
         "asc" => asc::read(&bytes, check),
         "npy" => npy::read(&bytes, &|| world_file(path, &["wld"]), check),
         other => Err(format!("`{other}` is no extension of a raster")),
     }
     .map_err(broken)?;
+    raster = raster.north_up();
     if raster.grid.crs.is_none() && has_geographic_prj(path) {
         raster.grid.crs = Some(Crs::degrees());
     }
@@ -120,7 +131,8 @@ pub fn read(path: &Path, max_bytes: u64) -> Result<Raster, Error> {
 /// Files beside a raster that [`read`] looks at, if they exist.
 pub fn companions(path: &Path) -> Vec<PathBuf> {
     let beside = ["tfw", "wld", "prj"].map(|extension| path.with_extension(extension));
-    beside.into_iter().filter(|path| path.is_file()).collect()
+    let beside = beside.into_iter().chain([beside_mask(path)]);
+    beside.filter(|path| path.is_file()).collect()
 }
 
 /// A named quantity with its unit, as a file describes it.
@@ -165,6 +177,34 @@ pub fn write(
 }
 
 impl Raster {
+    /// The same raster with its rows from north to south and its columns from west to east, if it has any: squares are cut along
+    /// the same diagonal however a file stores them. Turned and sheared rasters stay as they are.
+    fn north_up(mut self) -> Self {
+        let Grid {
+            width,
+            height,
+            transform: [x, a, b, y, d, e],
+            ..
+        } = self.grid;
+        if b != 0.0 || d != 0.0 {
+            return self;
+        }
+        if e > 0.0 {
+            self.grid.transform[3] = y + e * height as f64;
+            self.grid.transform[5] = -e;
+            // All rows, and then the columns of each row back again.
+            self.values.reverse();
+        }
+        if a < 0.0 {
+            self.grid.transform[0] = x + a * width as f64;
+            self.grid.transform[1] = -a;
+        }
+        if (e > 0.0) != (a < 0.0) {
+            self.values.chunks_mut(width).for_each(<[f64]>::reverse);
+        }
+        self
+    }
+
     /// Reads the text of an ESRI ASCII grid.
     ///
     /// # Errors
@@ -178,7 +218,11 @@ impl Raster {
     /// # Errors
     /// What is wrong.
     pub fn from_geotiff(bytes: &[u8]) -> Result<Self, String> {
-        geotiff::read(bytes, &|| Ok(None), |_| Ok(()))
+        let nothing = Beside {
+            world_file: &|| Ok(None),
+            mask: &|| Ok(None),
+        };
+        geotiff::read(bytes, &nothing, |_| Ok(())).map(Raster::north_up)
     }
 }
 
@@ -230,6 +274,23 @@ fn world_file(path: &Path, extensions: &[&str]) -> Result<Option<[f64; 6]>, Stri
         }
     }
     Ok(None)
+}
+
+/// Name of the mask beside a raster, as GDAL names it.
+fn beside_mask(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".msk");
+    name.into()
+}
+
+/// Bytes of the mask beside a raster.
+fn mask(path: &Path, max_bytes: u64) -> Result<Option<Vec<u8>>, String> {
+    let beside = beside_mask(path);
+    match beside.is_file() {
+        true => read_file(&beside, max_bytes).map(Some),
+        false => Ok(None),
+    }
+    .map_err(|error| error.to_string())
 }
 
 /// Whether a .prj file beside a raster describes degrees.

@@ -22,7 +22,7 @@ impl Raster {
     /// The surface of a raster of heights, with z up, measured from `origin` before it is rounded.
     ///
     /// Each square between four centres is two triangles, which share the diagonal from its first to its last centre in the order
-    /// of the file: from north west to south east in most files. A square with three centres is one triangle, one with fewer is a
+    /// of the grid: from north west to south east where rows run south, as in all rasters that were read upright. A square with three centres is one triangle, one with fewer is a
     /// hole. So the surface ends half a cell inside of the raster.
     pub fn mesh(&self, origin: [f64; 3]) -> RasterMesh {
         let (width, height) = (self.grid.width, self.grid.height);

@@ -8,7 +8,7 @@ use crate::{Grid, Raster};
 const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// What says where the cells of an array are.
-type WorldFile<'a> = &'a dyn Fn() -> Result<Option<[f64; 6]>, String>;
+pub type WorldFile<'a> = &'a dyn Fn() -> Result<Option<[f64; 6]>, String>;
 
 /// Reads an array of two dimensions, whose place is in a world file.
 pub fn read(

@@ -1,0 +1,307 @@
+//! Pixels of one band of a TIFF as they are stored (TIFF 6.0): strips and tiles that are unpacked by their tags alone.
+//!
+//! The decoder of the crate `tiff` makes pictures: it inverts bands where "white is zero", reads empty tiles from the beginning of
+//! the file, and knows no masks. Heights are no picture, so only its directories of tags are used.
+
+use std::io::{self, Read};
+
+use flate2::read::ZlibDecoder;
+use ruzstd::decoding::StreamingDecoder;
+use tiff::Directory;
+use tiff::decoder::Decoder;
+use tiff::tags::{ByteOrder, Tag};
+use weezl::{BitOrder, LzwStatus};
+
+use crate::Memory;
+
+/// Decoder of bytes in memory.
+pub type Bytes<'a> = Decoder<Memory<&'a [u8]>>;
+
+/// Tags that a page of pixels has.
+pub struct Page<'a> {
+    bytes: &'a [u8],
+    is_big_endian: bool,
+    pub size: [usize; 2],
+    /// Columns and rows of strips or tiles.
+    chunk: [usize; 2],
+    is_tiled: bool,
+    offsets: Vec<u64>,
+    counts: Vec<u64>,
+    compression: u16,
+    predictor: u16,
+    bits: usize,
+    format: u16,
+}
+
+const UNSIGNED: u16 = 1;
+const SIGNED: u16 = 2;
+const FLOAT: u16 = 3;
+
+/// Names of compressions that are not read.
+const PACKERS: [(u16, &str); 8] = [
+    (2, "CCITT RLE"),
+    (4, "CCITT fax 4"),
+    (7, "JPEG"),
+    (34_887, "LERC"),
+    (34_925, "LZMA"),
+    (50_001, "WebP"),
+    (50_002, "JPEG XL"),
+    (3, "CCITT fax 3"),
+];
+
+impl<'a> Page<'a> {
+    /// The page that a directory describes. `check` refuses sizes that there is no memory for.
+    pub fn new(
+        bytes: &'a [u8],
+        decoder: &mut Bytes<'a>,
+        directory: &Directory,
+        check: impl Fn([usize; 2]) -> Result<(), String>,
+    ) -> Result<Self, String> {
+        let is_big_endian = matches!(decoder.byte_order(), ByteOrder::BigEndian);
+        let mut tags = decoder.read_directory_tags(directory);
+        let mut list = |tag: Tag| match tags.find_tag_unsigned_vec::<u64>(tag) {
+            Ok(list) => Ok(list.unwrap_or_default()),
+            Err(error) => Err(error.to_string()),
+        };
+        let mut number = |tag: Tag, default: u64| {
+            let found = list(tag)?.first().copied().unwrap_or(default);
+            u32::try_from(found).map_err(|_| format!("tag {tag:?}: found {found}"))
+        };
+        let size = [
+            number(Tag::ImageWidth, 0)? as usize,
+            number(Tag::ImageLength, 0)? as usize,
+        ];
+        check(size)?;
+        let samples = number(Tag::SamplesPerPixel, 1)?;
+        let colours = number(Tag::PhotometricInterpretation, 1)?;
+        let bits = number(Tag::BitsPerSample, 1)? as usize;
+        let format = number(Tag::SampleFormat, 1)? as u16;
+        let kind = match (format, bits) {
+            _ if samples != 1 => Err(format!("{samples} bands")),
+            // White is 0, black is 0, or a mask: hints how to show a band, which leave its numbers alone.
+            _ if !matches!(colours, 0 | 1 | 4) => Err("colours".into()),
+            (UNSIGNED, 1..=16 | 32 | 64) | (SIGNED, 8 | 16 | 32 | 64) | (FLOAT, 16 | 32 | 64) => {
+                Ok(())
+            }
+            (5 | 6, _) => Err("complex numbers".into()),
+            _ => Err(format!("{bits} bits of the sample format {format}")),
+        };
+        kind.map_err(|found| format!("found pixels of {found}, wanted one band of numbers"))?;
+        if number(Tag::FillOrder, 1)? != 1 {
+            return Err("its bits are stored in reverse order (tag FillOrder)".into());
+        }
+        let compression = number(Tag::Compression, 1)? as u16;
+        let predictor = number(Tag::Predictor, 1)? as u16;
+        match (predictor, format) {
+            (1, _) => {}
+            (2, _) if bits.is_multiple_of(8) => {}
+            (3, FLOAT) => {}
+            _ => return Err(format!("found predictor {predictor} of {bits} bits")),
+        }
+        let is_tiled = directory.contains(Tag::TileOffsets);
+        let chunk = match is_tiled {
+            true => [
+                number(Tag::TileWidth, 0)? as usize,
+                number(Tag::TileLength, 0)? as usize,
+            ],
+            false => {
+                let rows = number(Tag::RowsPerStrip, u32::MAX.into())? as usize;
+                [size[0], rows.min(size[1])]
+            }
+        };
+        if chunk.contains(&0) {
+            return Err("its strips or tiles have no size".into());
+        }
+        if is_tiled {
+            check(chunk).map_err(|reason| format!("tiles: {reason}"))?;
+        }
+        let [offsets, counts] = match is_tiled {
+            true => [Tag::TileOffsets, Tag::TileByteCounts],
+            false => [Tag::StripOffsets, Tag::StripByteCounts],
+        };
+        let page = Self {
+            bytes,
+            is_big_endian,
+            size,
+            chunk,
+            is_tiled,
+            offsets: list(offsets)?,
+            counts: list(counts)?,
+            compression,
+            predictor,
+            bits,
+            format,
+        };
+        let wanted = size[0].div_ceil(chunk[0]) * size[1].div_ceil(chunk[1]);
+        match [page.offsets.len(), page.counts.len()] == [wanted; 2] {
+            true => Ok(page),
+            false => Err(format!(
+                "found {} offsets and {} lengths of {wanted} strips or tiles",
+                page.offsets.len(),
+                page.counts.len()
+            )),
+        }
+    }
+
+    /// Whether values are floats, so that marks are rounded as they are.
+    pub fn is_float(&self) -> bool {
+        self.format == FLOAT
+    }
+
+    /// All values, row by row. Strips and tiles that were never written have the value `missing`.
+    pub fn values(&self, missing: f64) -> Result<Vec<f64>, String> {
+        let [width, height] = self.size;
+        let mut values = Vec::new();
+        let room = values.try_reserve_exact(width * height);
+        room.map_err(|error| error.to_string())?;
+        values.resize(width * height, missing);
+        let across = width.div_ceil(self.chunk[0]);
+        let row_bytes = (self.chunk[0] * self.bits).div_ceil(8);
+        for (index, (&offset, &count)) in self.offsets.iter().zip(&self.counts).enumerate() {
+            // So GDAL writes those that have no data (SPARSE_OK).
+            if count == 0 || offset == 0 {
+                continue;
+            }
+            let kind = if self.is_tiled { "tile" } else { "strip" };
+            let broken = |reason: String| format!("{kind} {index}: {reason}");
+            let [column, row] = [index % across, index / across];
+            let [left, top] = [column * self.chunk[0], row * self.chunk[1]];
+            let rows = self.chunk[1].min(height - top);
+            let columns = self.chunk[0].min(width - left);
+            let packed = usize::try_from(offset).ok().and_then(|offset| {
+                let end = offset.checked_add(usize::try_from(count).ok()?)?;
+                self.bytes.get(offset..end)
+            });
+            let packed = packed.ok_or_else(|| {
+                broken(format!(
+                    "its {count} bytes from {offset} on end behind the file"
+                ))
+            })?;
+            let mut data = self.unpack(packed, row_bytes * rows).map_err(broken)?;
+            for (row, line) in data.chunks_exact_mut(row_bytes).enumerate() {
+                let first = (top + row) * width + left;
+                self.row(line, &mut values[first..first + columns]);
+            }
+        }
+        Ok(values)
+    }
+
+    /// The first bytes of a strip or tile, as many as are wanted.
+    fn unpack(&self, packed: &[u8], wanted: usize) -> Result<Vec<u8>, String> {
+        let read = |reader: &mut dyn Read| {
+            let mut data = Vec::new();
+            reader.take(wanted as u64).read_to_end(&mut data)?;
+            Ok::<_, io::Error>(data)
+        };
+        let text = |error: io::Error| error.to_string();
+        let data = match self.compression {
+            1 => packed[..wanted.min(packed.len())].to_vec(),
+            5 => lzw(packed, wanted)?,
+            8 | 32_946 => read(&mut ZlibDecoder::new(packed)).map_err(text)?,
+            32_773 => pack_bits(packed, wanted),
+            50_000 => {
+                let decoder = StreamingDecoder::new(packed);
+                read(&mut decoder.map_err(|error| error.to_string())?).map_err(text)?
+            }
+            other => {
+                let name = PACKERS.iter().find(|(code, _)| *code == other);
+                let name = name.map_or(format!("method {other}"), |(_, name)| (*name).into());
+                return Err(format!(
+                    "its pixels are compressed by {name}, which is not read; rewrite the file with \
+                     gdal_translate -co COMPRESS=DEFLATE in.tif out.tif"
+                ));
+            }
+        };
+        match data.len() == wanted {
+            true => Ok(data),
+            false => Err(format!("found {} bytes, wanted {wanted}", data.len())),
+        }
+    }
+
+    /// Numbers of a row of a strip or tile.
+    fn row(&self, line: &mut [u8], values: &mut [f64]) {
+        if !self.bits.is_multiple_of(8) {
+            // From the highest bit on, whatever the order of bytes.
+            for (index, value) in values.iter_mut().enumerate() {
+                let bits = index * self.bits..(index + 1) * self.bits;
+                let bit = |at: usize| line[at / 8] >> (7 - at % 8) & 1;
+                *value = f64::from(bits.fold(0_u32, |sum, at| 2 * sum + u32::from(bit(at))));
+            }
+            return;
+        }
+        let bytes = self.bits / 8;
+        let count = line.len() / bytes;
+        if self.predictor == 3 {
+            // Differences of bytes, of which all first and highest ones come first (Adobe Photoshop TIFF, Technical Note 3).
+            for at in 1..line.len() {
+                line[at] = line[at].wrapping_add(line[at - 1]);
+            }
+        }
+        let mut before = 0_u64;
+        for (index, value) in values.iter_mut().enumerate() {
+            let byte = |place: usize| {
+                u64::from(match (self.predictor, self.is_big_endian) {
+                    (3, _) => line[place * count + index],
+                    (_, true) => line[index * bytes + place],
+                    (_, false) => line[(index + 1) * bytes - 1 - place],
+                })
+            };
+            let mut word = (0..bytes).fold(0, |word, place| word << 8 | byte(place));
+            if self.predictor == 2 {
+                word = word.wrapping_add(before) & u64::MAX >> (64 - self.bits);
+                before = word;
+            }
+            *value = self.number(word);
+        }
+    }
+
+    /// The number that a word of bits means.
+    fn number(&self, word: u64) -> f64 {
+        match (self.format, self.bits) {
+            (FLOAT, 16) => half::f16::from_bits(word as u16).to_f64(),
+            (FLOAT, 32) => f32::from_bits(word as u32).into(),
+            (FLOAT, _) => f64::from_bits(word),
+            (SIGNED, bits) => ((word << (64 - bits)) as i64 >> (64 - bits)) as f64,
+            _ => word as f64,
+        }
+    }
+}
+
+/// LZW as TIFF has it. Bytes are missing where the code ends early.
+fn lzw(packed: &[u8], wanted: usize) -> Result<Vec<u8>, String> {
+    let mut decoder = weezl::decode::Decoder::with_tiff_size_switch(BitOrder::Msb, 8);
+    let mut data = Vec::new();
+    let room = data.try_reserve_exact(wanted);
+    room.map_err(|error| error.to_string())?;
+    data.resize(wanted, 0);
+    let (mut read, mut written) = (0, 0);
+    while written < wanted {
+        let done = decoder.decode_bytes(&packed[read..], &mut data[written..]);
+        read += done.consumed_in;
+        written += done.consumed_out;
+        match done.status {
+            Ok(LzwStatus::Ok) => {}
+            Ok(_) => break,
+            Err(error) => return Err(format!("LZW: {error}")),
+        }
+    }
+    data.truncate(written);
+    Ok(data)
+}
+
+/// Runs of equal bytes (TIFF 6.0, section 9).
+fn pack_bits(mut packed: &[u8], wanted: usize) -> Vec<u8> {
+    let mut data = Vec::new();
+    while let ([head, rest @ ..], true) = (packed, data.len() < wanted) {
+        let (run, times) = match *head as i8 {
+            -128 => (0, 1),
+            count @ 0.. => (count as usize + 1, 1),
+            count => (1, 1 - count as isize),
+        };
+        let run = &rest[..run.min(rest.len())];
+        (0..times).for_each(|_| data.extend(run));
+        packed = &rest[run.len()..];
+    }
+    data.truncate(wanted);
+    data
+}
