@@ -152,8 +152,10 @@ impl Scene {
 
     /// A scene of a grid of heights, such as a digital elevation model.
     ///
-    /// Each cell between four heights is two triangles, cut from the corner ``heights[i, j]`` to ``heights[i + 1, j + 1]``. Normals point
-    /// up. Triangles with a corner that is NaN or infinite are left out: holes. The vertex of ``heights[i, j]`` has the number ``i * columns + j`` in ``faces``.
+    /// Each cell between four heights is two triangles, cut from its north-western to its south-eastern corner (the least x with the greatest
+    /// y, and the reverse) in whatever order the heights are stored, so that ``from_file`` of the same raster has the same triangles. Turned
+    /// grids are cut from ``heights[i, j]`` to ``heights[i + 1, j + 1]``. Normals point up. A cell with one corner that is NaN or infinite is
+    /// one triangle, and one with more is a hole. The vertex of ``heights[i, j]`` has the number ``i * columns + j`` in ``faces``.
     ///
     /// Parameters
     /// ----------

@@ -171,9 +171,9 @@ def test_heights_are_a_grid():
     rows, columns = np.mgrid[0:8, 0:11]
     inner = (slice(1, -1), slice(1, -1))
     np.testing.assert_allclose(down(scene, columns[inner], rows[inner]).point[..., 2], z[inner], atol=1e-5)
-    # The diagonal runs from the first corner of a cell to its last one.
+    # The diagonal runs from the north-western corner of a cell, which is in the row after, to the south-eastern one.
     middle = down(scene, columns[:-1, :-1] + 0.5, rows[:-1, :-1] + 0.5).point[..., 2]
-    np.testing.assert_allclose(middle, (z[:-1, :-1] + z[1:, 1:]) / 2, atol=1e-5)
+    np.testing.assert_allclose(middle, (z[1:, :-1] + z[:-1, 1:]) / 2, atol=1e-5)
     assert (down(scene, 3.3, 4.4).normal[2] > 0) and (scene.normals[:, 2] > 0).all()
     np.testing.assert_allclose(scene.vertices.reshape(8, 11, 3), np.stack([columns, rows, z], -1), atol=1e-6)
 
@@ -212,11 +212,33 @@ def test_heights_that_are_not_there_are_holes():
         warnings.simplefilter("error")
         scene = am.Scene.from_heights(z)
         masked = am.Scene.from_heights(np.ma.masked_equal(np.where(np.isnan(z), -9999, 0).astype(np.int16), -9999))
-    # Six triangles have this corner.
-    assert scene.report["triangles"] == masked.report["triangles"] == 2 * 25 - 6
-    assert not down(scene, 3.0, 2.0).hit and not down(scene, 2.6, 2.2).hit
-    assert down(scene, 2.2, 2.6).hit and down(scene, 1.5, 4.3).hit
+    # Each of four cells has one triangle left.
+    assert scene.report["triangles"] == masked.report["triangles"] == 2 * 25 - 4
+    assert not down(scene, 3.0, 2.0).hit and not down(scene, 2.6, 1.8).hit and not down(scene, 2.6, 2.2).hit
+    assert down(scene, 2.3, 1.4).hit and down(scene, 2.3, 2.6).hit and down(scene, 1.5, 4.3).hit
     assert am.Scene.from_heights(np.full((3, 3), np.nan)).report["triangles"] == 0
+
+
+def test_a_raster_has_the_same_triangles_from_a_file_and_from_an_array(tmp_path):
+    z = RNG.uniform(0, 3, (30, 40)).round(2)
+    z[RNG.uniform(size=z.shape) < 0.1] = np.nan
+    rows = "\n".join(" ".join("-9" if np.isnan(x) else str(x) for x in row) for row in z)
+    path = tmp_path / "z.asc"
+    path.write_text(f"ncols 40\nnrows 30\nxllcorner 100\nyllcorner 50\ncellsize 2\nNODATA_value -9\n{rows}\n")
+    loaded = am.Scene.from_file(path)
+
+    def corners(scene):
+        return sorted(map(sorted, scene.vertices[scene.faces].round(3).tolist()))
+
+    wanted = corners(loaded)
+    assert len(wanted) == loaded.report["triangles"] > 1000
+    # From the north, from the south, and mirrored.
+    for part, transform in [
+        (z, (2, 0, 100, 0, -2, 110)),
+        (z[::-1], (2, 0, 100, 0, 2, 50)),
+        (z[:, ::-1], (-2, 0, 180, 0, -2, 110)),
+    ]:
+        assert corners(am.Scene.from_heights(part, transform)) == wanted
 
 
 def test_heights_of_xarray():

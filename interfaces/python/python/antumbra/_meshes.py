@@ -241,7 +241,7 @@ def _placed(rows: Any, columns: Any, transform: Any) -> tuple[NDArray[np.float64
 
 
 def _cells(points: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Two triangles for each cell whose corners are finite, counterclockwise seen from above."""
+    """Two triangles for each cell whose corners are finite, one where one is not; counterclockwise seen from above."""
     rows, columns = points.shape[:2]
     if rows < 2 or columns < 2:
         raise ValueError(f"heights: found shape {(rows, columns)}, wanted at least 2 rows and 2 columns")
@@ -251,10 +251,15 @@ def _cells(points: NDArray[np.float64]) -> NDArray[np.int64]:
     turn = along[0] * down[1] - along[1] * down[0]
     if turn == 0:
         raise ValueError("transform: found rows and columns that run the same way, wanted a grid with an area")
-    cells = [(first, right, last), (first, last, below)] if turn > 0 else [(first, last, right), (first, below, last)]
-    faces = np.stack([np.stack(cell, -1) for cell in cells], 2).reshape(-1, 3)
+    if turn > 0 and along[1] == down[0] == 0:
+        # From the south, or mirrored: read the other way, squares are cut from north west to south east, as in files.
+        first, right, below, last, turn = right, first, last, below, -turn
     whole = np.isfinite(points[..., 2]).reshape(-1)
-    if whole.all():
-        return faces
+    # Of four triangles in the square, those that keep off a missing corner.
+    cut = whole[first] & whole[last]
+    cells = [(first, np.where(cut, last, below), right), (np.where(cut, first, right), below, last)]
+    faces = np.stack([np.stack(cell, -1) for cell in cells], 2).reshape(-1, 3)
+    if turn > 0:
+        faces = faces[:, [0, 2, 1]]
     kept: NDArray[np.int64] = faces[whole[faces].all(1)]
     return kept
