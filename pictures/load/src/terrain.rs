@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use antumbra_mesh::{Warning, plain_material};
-use antumbra_raster::{Grid, Raster, companions, read};
+use antumbra_raster::{Crs, Raster, companions, read, unit_name};
 use antumbra_scene::TriangleMesh;
 use glam::DVec3;
 
@@ -15,7 +15,7 @@ use crate::{Error, Extent, Options};
 /// Reads a raster as the surface between the centres of its cells, measured from `origin`, within `limit` bytes.
 pub fn load(path: &Path, name: String, limit: u64, origin: DVec3) -> Result<Loaded, Error> {
     let raster = read(path, limit)?;
-    let warnings = warnings(path, &raster.grid);
+    let warnings = warnings(path, &raster);
     let surface = raster.mesh(origin.to_array());
     let cells = raster.into_cells(&surface);
     let mesh = TriangleMesh {
@@ -53,7 +53,7 @@ pub struct Heights {
 /// The file has mistakes, or takes more memory than allowed. With [`Options::strict`], warnings are errors, too.
 pub fn load_heights(path: &Path, options: &Options) -> Result<Heights, Error> {
     let raster = read(path, options.max_memory.bytes())?;
-    let warnings = warnings(path, &raster.grid);
+    let warnings = warnings(path, &raster);
     if options.strict && !warnings.is_empty() {
         return Err(Error::Strict(warnings));
     }
@@ -73,7 +73,8 @@ pub fn load_heights(path: &Path, options: &Options) -> Result<Heights, Error> {
 }
 
 /// Warnings about a raster that seems not to be in one unit of length.
-fn warnings(path: &Path, grid: &Grid) -> Vec<Warning> {
+fn warnings(path: &Path, raster: &Raster) -> Vec<Warning> {
+    let grid = &raster.grid;
     let mut warnings = Vec::new();
     let mut warn = |text: String| {
         let place = path.display().to_string();
@@ -85,18 +86,18 @@ fn warnings(path: &Path, grid: &Grid) -> Vec<Warning> {
             "cells of {cell} on coordinates that are on the globe look like degrees; sizes must be in the unit of the heights"
         ));
     }
-    if let Some([ground, height]) = grid.crs.as_ref().and_then(|crs| crs.odd_units()) {
-        let unit = |code: u16| match code {
-            9001 => "metres".to_owned(),
-            9002 => "feet".to_owned(),
-            9003 => "US survey feet".to_owned(),
-            code => format!("EPSG:{code}"),
-        };
-        warn(format!(
-            "coordinates are in {}, and heights in {} as far as the file says; they are taken as one unit",
-            unit(ground),
-            unit(height)
-        ));
+    let ground = grid.crs.as_ref().and_then(Crs::metres).unwrap_or(1.0);
+    match raster.height_factor {
+        Some(factor) if (factor - 1.0).abs() > 1e-9 => warn(format!(
+            "heights are in {} and coordinates in {}: heights are multiplied by {factor:.6}",
+            unit_name(factor * ground),
+            unit_name(ground)
+        )),
+        None if ground != 1.0 => warn(format!(
+            "coordinates are in {}; the file does not say in which unit its heights are, and they are taken to be in the same",
+            unit_name(ground)
+        )),
+        _ => {}
     }
     warnings
 }
@@ -147,5 +148,22 @@ mod tests {
         fs::write(path.with_extension("prj"), "GEOGCS[\"WGS 84\"]").expect("a file");
         let error = load(&path, &Options::default()).expect_err("degrees");
         assert!(error.to_string().contains("gdalwarp"), "{error}");
+    }
+
+    #[test]
+    fn units_of_heights_are_those_of_the_ground() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../raster/tests/rasters");
+        let open =
+            |name: &str| load_heights(format!("{folder}/{name}").as_ref(), &Options::default());
+        let both = open("feet.tif").expect("feet");
+        assert!(both.warnings.is_empty(), "{:?}", both.warnings);
+        let mixed = open("feet_metres.tif").expect("feet and metres");
+        let text = &mixed.warnings[0].text;
+        assert!(
+            text.contains("heights are in m and coordinates in US survey ft"),
+            "{text}"
+        );
+        let height = mixed.raster.values[0] / both.raster.values[0];
+        assert!((height - 3937.0 / 1200.0).abs() < 1e-12, "{height}");
     }
 }

@@ -64,7 +64,11 @@ pub fn read(
         }
     }
     match values.len() == count {
-        true => Ok(Raster { grid, values }),
+        true => Ok(Raster {
+            grid,
+            values,
+            height_factor: None,
+        }),
         false => Err(format!(
             "found {} values, wanted {} x {} = {count}: the file is not complete",
             values.len(),

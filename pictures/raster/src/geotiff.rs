@@ -10,6 +10,7 @@ use tiff::encoder::compression::DeflateLevel;
 use tiff::encoder::{Compression, TiffEncoder};
 use tiff::tags::Tag;
 
+use crate::crs::US_FOOT;
 use crate::grid::check_transform;
 use crate::npy::WorldFile;
 use crate::pixels::{Bytes, Page};
@@ -52,7 +53,16 @@ pub fn read(
         })?),
     };
     let notes = string(&mut decoder, Tag::Unknown(GDAL_METADATA)).unwrap_or_default();
-    let [scale, offset] = scale_and_offset(&notes)?;
+    let [mut scale, mut offset] = scale_and_offset(&notes)?;
+    // Heights in the unit of the ground, if both are known.
+    let of_heights = crs.as_ref().and_then(Crs::height_metres);
+    let of_heights = of_heights.or_else(|| unit_of_heights(&notes));
+    let of_ground = crs.as_ref().and_then(Crs::metres);
+    let height_factor = of_heights
+        .zip(of_ground)
+        .map(|(height, ground)| height / ground);
+    scale *= height_factor.unwrap_or(1.0);
+    offset *= height_factor.unwrap_or(1.0);
     let mut values = page.values(no_data.unwrap_or(0.0))?;
     for value in &mut values {
         // Marks of floats are written with fewer digits than the pixels have.
@@ -100,6 +110,7 @@ pub fn read(
             crs,
         },
         values,
+        height_factor,
     })
 }
 
@@ -153,6 +164,7 @@ fn crs(decoder: &mut Bytes<'_>) -> Option<Crs> {
         directory,
         doubles: doubles(decoder, Tag::GeoDoubleParamsTag).unwrap_or_default(),
         names: string(decoder, Tag::GeoAsciiParamsTag).unwrap_or_default(),
+        projection: String::new(),
     })
 }
 
@@ -184,19 +196,33 @@ fn transform(decoder: &mut Bytes<'_>, crs: Option<&Crs>) -> Result<Option<[f64; 
     }))
 }
 
+/// Text of the note of GDAL with a role.
+fn note<'a>(notes: &'a str, role: &str) -> Option<&'a str> {
+    let (_, rest) = notes.split_once(&format!("role=\"{role}\""))?;
+    let (_, rest) = rest.split_once('>')?;
+    Some(rest.split_once('<')?.0.trim())
+}
+
 /// Scale and offset of values in the notes of GDAL.
 fn scale_and_offset(notes: &str) -> Result<[f64; 2], String> {
     let item = |role: &str, default: f64| {
-        let found = notes.split_once(&format!("role=\"{role}\""));
-        let text = found.and_then(|(_, rest)| rest.split_once('>'));
-        let text = text.and_then(|(_, rest)| rest.split_once('<'));
-        let Some((text, _)) = text else {
+        let Some(text) = note(notes, role) else {
             return Ok(default);
         };
-        let number = text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+        let number = text.parse::<f64>().ok().filter(|x| x.is_finite());
         number.ok_or_else(|| format!("{role}: found `{text}`, wanted a number"))
     };
     Ok([item("scale", 1.0)?, item("offset", 0.0)?])
+}
+
+/// Metres in the unit of values in the notes of GDAL, by the names that programs write.
+fn unit_of_heights(notes: &str) -> Option<f64> {
+    match &*note(notes, "unittype")?.to_ascii_lowercase() {
+        "m" | "metre" | "metres" | "meter" | "meters" => Some(1.0),
+        "ft" | "foot" | "feet" | "international foot" => Some(0.3048),
+        "us survey foot" | "us survey feet" | "us-ft" | "ftus" => Some(US_FOOT),
+        _ => None,
+    }
 }
 
 /// Writes one band.
@@ -272,6 +298,7 @@ mod tests {
             directory: point_keys.to_vec(),
             doubles: vec![1.5],
             names: "a name|".into(),
+            projection: String::new(),
         };
         let systems = [
             None,
@@ -306,6 +333,9 @@ mod tests {
         assert_eq!(scale_and_offset(notes), Ok([0.01, 100.0]));
         assert_eq!(scale_and_offset(""), Ok([1.0, 0.0]));
         assert!(scale_and_offset("role=\"scale\">two<").is_err());
+        let unit = "<Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">US survey foot</Item>";
+        assert_eq!(unit_of_heights(unit), Some(US_FOOT));
+        assert_eq!(unit_of_heights(notes), None);
     }
 
     #[test]

@@ -49,7 +49,11 @@ impl Grid {
 
     /// Map coordinates of the centre of a cell.
     pub fn centre(&self, column: usize, row: usize) -> [f64; 2] {
-        let [c, r] = [column as f64 + 0.5, row as f64 + 0.5];
+        self.corner(column as f64 + 0.5, row as f64 + 0.5)
+    }
+
+    /// Map coordinates of a column and a row, which may be between cells.
+    pub fn corner(&self, c: f64, r: f64) -> [f64; 2] {
         let t = &self.transform;
         [t[0] + c * t[1] + r * t[2], t[3] + c * t[4] + r * t[5]]
     }

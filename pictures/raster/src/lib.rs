@@ -31,7 +31,7 @@ use std::fs::{self, File};
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
-pub use crs::Crs;
+pub use crs::{Crs, Site, unit_name};
 use geotiff::Beside;
 pub use grid::{Grid, RasterCells};
 pub use mesh::RasterMesh;
@@ -76,6 +76,9 @@ pub struct Raster {
     pub grid: Grid,
     /// Values, `[height, width]`, the first row first. NaN where the file has no data.
     pub values: Vec<f64>,
+    /// What the heights of the file were multiplied by, so that they have the unit of map coordinates; `None` if the file says
+    /// nothing of their unit.
+    pub height_factor: Option<f64>,
 }
 
 /// Bytes of memory for each cell of a raster as a mesh: its value, vertex, normal and two triangles.
@@ -91,10 +94,11 @@ const PER_CELL: u64 = 8 + 12 + 12 + 24 + 8;
 ///
 /// Rows come back from north to south and columns from west to east, unless the raster is turned or sheared.
 ///
-/// A `.prj` file beside an `.asc`, a `.npy` or a plain `.tif` says whether its coordinates are degrees.
+/// A `.prj` file beside an `.asc`, a `.npy` or a plain `.tif` is its coordinate system.
 ///
 /// # Errors
-/// [`Error::Io`], or [`Error::Broken`] with the reason. Rasters in degrees are refused: their cells have no length.
+/// [`Error::Io`], or [`Error::Broken`] with the reason. Rasters in degrees are refused, since their cells have no length, and so are
+/// those in systems such as Web Mercator, whose lengths at the middle of the raster are not those on the ground: see [`Site::stretch`].
 pub fn read(path: &Path, max_bytes: u64) -> Result<Raster, Error> {
     let broken = |reason: String| Error::Broken {
         path: path.to_path_buf(),
@@ -117,13 +121,28 @@ pub fn read(path: &Path, max_bytes: u64) -> Result<Raster, Error> {
     }
     .map_err(broken)?;
     raster = raster.north_up();
-    if raster.grid.crs.is_none() && has_geographic_prj(path) {
-        raster.grid.crs = Some(Crs::degrees());
+    if raster.grid.crs.is_none() {
+        raster.grid.crs = system_beside(path);
     }
-    if raster.grid.crs.as_ref().is_some_and(Crs::is_geographic) {
-        let reason = "its coordinates are degrees, in which cells have no length; project it to metres first, as with \
-                      gdalwarp -t_srs EPSG:32632";
-        return Err(broken(reason.into()));
+    let grid = &raster.grid;
+    let middle = grid.corner(0.5 * grid.width as f64, 0.5 * grid.height as f64);
+    let Some(crs) = &grid.crs else {
+        return Ok(raster);
+    };
+    if crs.is_geographic() {
+        let remedy = crs::remedy(middle[1], middle[0]);
+        return Err(broken(format!(
+            "its coordinates are degrees, in which cells have no length; project it to metres first, as with {remedy}"
+        )));
+    }
+    let site = crs.site(middle);
+    if let Some((site, scale)) = site.and_then(|site| Some((site, site.stretch()?))) {
+        return Err(broken(format!(
+            "lengths in {} are {scale:.3} times as long as on the ground at {:.2} degrees of latitude; project it first, as with {}",
+            crs.name(),
+            site.latitude,
+            site.remedy()
+        )));
     }
     Ok(raster)
 }
@@ -293,21 +312,10 @@ fn mask(path: &Path, max_bytes: u64) -> Result<Option<Vec<u8>>, String> {
     .map_err(|error| error.to_string())
 }
 
-/// Whether a .prj file beside a raster describes degrees.
-fn has_geographic_prj(path: &Path) -> bool {
-    let Ok(bytes) = read_file(&path.with_extension("prj"), SMALL) else {
-        return false;
-    };
-    let text = String::from_utf8_lossy(&bytes).trim().to_ascii_uppercase();
-    [
-        "GEOGCS",
-        "GEOGCRS",
-        "GEODCRS",
-        "GEODETICCRS",
-        "GEOGRAPHICCRS",
-    ]
-    .iter()
-    .any(|start| text.starts_with(start))
+/// Coordinate system of the .prj file beside a raster.
+fn system_beside(path: &Path) -> Option<Crs> {
+    let bytes = read_file(&path.with_extension("prj"), SMALL).ok()?;
+    Crs::from_wkt(&String::from_utf8_lossy(&bytes))
 }
 
 /// Bytes in memory as a file that can be read and written anywhere.

@@ -124,6 +124,7 @@ mod tests {
         Raster {
             grid: Grid::north_up(size, [100.0, 50.0], 10.0),
             values: rows.concat(),
+            height_factor: None,
         }
     }
 

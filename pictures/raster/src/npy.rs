@@ -61,6 +61,7 @@ pub fn read(
             crs: None,
         },
         values,
+        height_factor: None,
     })
 }
 

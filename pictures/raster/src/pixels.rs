@@ -1,4 +1,4 @@
-//! Pixels of one band of a TIFF as they are stored (TIFF 6.0): strips and tiles that are unpacked by their tags alone.
+//! Pixels of one band of a TIFF as they are stored (TIFF 6.0): strips and tiles that only their tags unpack.
 //!
 //! The decoder of the crate `tiff` makes pictures: it inverts bands where "white is zero", reads empty tiles from the beginning of
 //! the file, and knows no masks. Heights are no picture, so only its directories of tags are used.

@@ -39,5 +39,5 @@ fn files_of_gdal_are_read_as_gdal_reads_them() {
         }
         counts[0] += 1;
     }
-    assert_eq!(counts, [45, 7], "files that are read, and refused");
+    assert_eq!(counts, [47, 9], "files that are read, and refused");
 }

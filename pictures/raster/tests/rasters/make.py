@@ -23,7 +23,7 @@ PLAIN = np.abs(np.round(TERRAIN)).clip(0, 200)
 lines = []
 
 
-def write(name, z=TERRAIN, kind="float32", nodata=HOLE, transform=NORTH, mask=None, windows=None, refused=None, notes=None, **options):
+def write(name, z=TERRAIN, kind="float32", nodata=HOLE, transform=NORTH, mask=None, windows=None, refused=None, notes=None, unit=None, factor=1.0, **options):
     path = f"{name}.tif"
     height, width = z.shape
     crs = options.pop("crs", "EPSG:25832")
@@ -37,17 +37,19 @@ def write(name, z=TERRAIN, kind="float32", nodata=HOLE, transform=NORTH, mask=No
             file.write_mask(mask)
         if notes is not None:
             file.scales, file.offsets = notes
-    expect(path, refused)
+        if unit is not None:
+            file.units = (unit,)
+    expect(path, refused, factor)
 
 
-def expect(path, refused=None):
+def expect(path, refused=None, factor=1.0):
     if refused is not None:
         lines.append(f"{path} ! {refused}")
         return
     with rasterio.open(path) as file:
         band = file.read(1, masked=True)
         cells = np.where(np.ma.getmaskarray(band), np.nan, np.ma.getdata(band).astype(np.float64))
-        cells = cells * file.scales[0] + file.offsets[0]
+        cells = cells * (file.scales[0] * factor) + file.offsets[0] * factor
         c, a, b, f, d, e = file.transform.to_gdal()
         if b == d == 0 and e > 0:
             cells, f, e = cells[::-1], f + e * file.height, -e
@@ -114,6 +116,12 @@ with rasterio.open("point.tif", "w", driver="GTiff", width=11, height=9, count=1
     file.update_tags(AREA_OR_POINT="Point")
     file.write(PLAIN.astype("int16"), 1)
 expect("point.tif")
+# Units: of a compound system, of heights in metres over feet, and places where lengths are not those on the ground.
+write("feet", crs="EPSG:2263+6360", transform=from_origin(980000, 200000, 2, 2))
+write("feet_metres", kind="int16", crs="EPSG:2263", unit="metre", factor=1 / (1200 / 3937), transform=from_origin(980000, 200000, 2, 2))
+web = from_origin(1288000, 6130000, 2, 2)
+write("mercator", crs="EPSG:3857", transform=web, refused="lengths in EPSG:3857 are 1.500 times as long as on the ground at 48.14")
+write("degrees", crs="EPSG:4326", transform=from_origin(-105.3, -40, 1e-5, 1e-5), refused="gdalwarp -t_srs EPSG:32713 in.tif out.tif")
 # With overviews, which are no masks, and a mask of each.
 with rasterio.Env(GDAL_TIFF_INTERNAL_MASK=True):
     with rasterio.open("mask.tif") as file:
