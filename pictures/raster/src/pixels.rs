@@ -6,6 +6,7 @@
 use std::io::{self, Read};
 
 use flate2::read::ZlibDecoder;
+use half::f16;
 use ruzstd::decoding::StreamingDecoder;
 use tiff::Directory;
 use tiff::decoder::Decoder;
@@ -220,49 +221,64 @@ impl<'a> Page<'a> {
 
     /// Numbers of a row of a strip or tile.
     fn row(&self, line: &mut [u8], values: &mut [f64]) {
-        if !self.bits.is_multiple_of(8) {
+        match (self.format, self.bits) {
+            (FLOAT, 16) => self.words::<2>(line, values, |word| f16::from_bits(word as u16).into()),
+            (FLOAT, 32) => self.words::<4>(line, values, |word| f32::from_bits(word as u32).into()),
+            (FLOAT, _) => self.words::<8>(line, values, f64::from_bits),
+            (SIGNED, 8) => self.words::<1>(line, values, |word| (word as i8).into()),
+            (SIGNED, 16) => self.words::<2>(line, values, |word| (word as i16).into()),
+            (SIGNED, 32) => self.words::<4>(line, values, |word| (word as i32).into()),
+            (SIGNED, _) => self.words::<8>(line, values, |word| word as i64 as f64),
+            (_, 8) => self.words::<1>(line, values, |word| word as f64),
+            (_, 16) => self.words::<2>(line, values, |word| word as f64),
+            (_, 32) => self.words::<4>(line, values, |word| word as f64),
+            (_, 64) => self.words::<8>(line, values, |word| word as f64),
             // From the highest bit on, whatever the order of bytes.
-            for (index, value) in values.iter_mut().enumerate() {
-                let bits = index * self.bits..(index + 1) * self.bits;
-                let bit = |at: usize| line[at / 8] >> (7 - at % 8) & 1;
-                *value = f64::from(bits.fold(0_u32, |sum, at| 2 * sum + u32::from(bit(at))));
+            _ => {
+                for (index, value) in values.iter_mut().enumerate() {
+                    let bits = index * self.bits..(index + 1) * self.bits;
+                    let bit = |at: usize| u32::from(line[at / 8] >> (7 - at % 8) & 1);
+                    *value = f64::from(bits.fold(0, |sum, at| 2 * sum + bit(at)));
+                }
             }
-            return;
         }
-        let bytes = self.bits / 8;
-        let count = line.len() / bytes;
+    }
+
+    /// Numbers of whole bytes, from their words of bits.
+    fn words<const N: usize>(
+        &self,
+        line: &mut [u8],
+        values: &mut [f64],
+        number: impl Fn(u64) -> f64,
+    ) {
+        let mut is_big_endian = self.is_big_endian;
         if self.predictor == 3 {
             // Differences of bytes, of which all first and highest ones come first (Adobe Photoshop TIFF, Technical Note 3).
             for at in 1..line.len() {
                 line[at] = line[at].wrapping_add(line[at - 1]);
             }
+            let planes = line.to_vec();
+            let count = line.len() / N;
+            for (index, word) in line.as_chunks_mut::<N>().0.iter_mut().enumerate() {
+                *word = std::array::from_fn(|place| planes[place * count + index]);
+            }
+            is_big_endian = true;
         }
         let mut before = 0_u64;
-        for (index, value) in values.iter_mut().enumerate() {
-            let byte = |place: usize| {
-                u64::from(match (self.predictor, self.is_big_endian) {
-                    (3, _) => line[place * count + index],
-                    (_, true) => line[index * bytes + place],
-                    (_, false) => line[(index + 1) * bytes - 1 - place],
-                })
+        for (value, bytes) in values.iter_mut().zip(line.as_chunks::<N>().0) {
+            let mut all = [0; 8];
+            let mut word = if is_big_endian {
+                all[8 - N..].copy_from_slice(bytes);
+                u64::from_be_bytes(all)
+            } else {
+                all[..N].copy_from_slice(bytes);
+                u64::from_le_bytes(all)
             };
-            let mut word = (0..bytes).fold(0, |word, place| word << 8 | byte(place));
             if self.predictor == 2 {
                 word = word.wrapping_add(before) & u64::MAX >> (64 - self.bits);
                 before = word;
             }
-            *value = self.number(word);
-        }
-    }
-
-    /// The number that a word of bits means.
-    fn number(&self, word: u64) -> f64 {
-        match (self.format, self.bits) {
-            (FLOAT, 16) => half::f16::from_bits(word as u16).to_f64(),
-            (FLOAT, 32) => f32::from_bits(word as u32).into(),
-            (FLOAT, _) => f64::from_bits(word),
-            (SIGNED, bits) => ((word << (64 - bits)) as i64 >> (64 - bits)) as f64,
-            _ => word as f64,
+            *value = number(word);
         }
     }
 }
