@@ -9,6 +9,7 @@
 //! The parts of a scene serialize with `serde`, for fingerprints only. Long lists become their bytes in memory,
 //! which depend on the machine and cannot be read back.
 //!
+//! - [`polygon`]: polygons as triangles
 //! - [`shape`]: triangle meshes, spheres and curves, each with its material and, perhaps, its emission
 //! - [`curve`]: hairs, fur and grass
 //! - [`instance`]: objects and their instances
@@ -46,6 +47,7 @@ pub mod instance;
 pub mod light;
 pub mod material;
 pub mod medium;
+pub mod polygon;
 pub mod settings;
 pub mod shape;
 pub mod texture;
@@ -72,6 +74,11 @@ use glam::DVec3;
 
 /// Linear RGB colour, unbounded: radiance, reflectance or a factor, as the field says.
 pub type Rgb = glam::Vec3;
+
+/// Bytes of a text without the byte order mark of UTF-8 that some programs write before it. All readers of texts skip it here.
+pub fn without_mark(text: &[u8]) -> &[u8] {
+    text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(text)
+}
 
 /// Serializes a long list as its bytes in memory.
 fn raw<T: bytemuck::NoUninit, S: serde::Serializer>(

@@ -1,5 +1,6 @@
 //! Shapes: meshes, spheres and curves with their attributes, and how transformations move them.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use crate::{Curves, MediumInterface, Param, Rgb, transform};
@@ -127,6 +128,43 @@ impl TriangleMesh {
             *normal = transform::unit(of_normals * normal.as_dvec3());
         }
     }
+
+    /// Gives corners whose normal is the zero vector the normal of their triangle. A vertex becomes several where such
+    /// triangles differ. Without any normal, the list becomes empty.
+    pub fn fill_normals(&mut self) {
+        let is_open: Vec<bool> = self.normals.iter().map(|n| *n == Vec3::ZERO).collect();
+        if is_open.iter().all(|&open| open) {
+            self.normals.clear();
+            return;
+        }
+        if !is_open.contains(&true) {
+            return;
+        }
+        let mut copies: HashMap<(u32, [u32; 3]), u32> = HashMap::new();
+        for index in 0..self.indices.len() {
+            let corners = self.indices[index];
+            let [a, b, c] = corners.map(|corner| Vec3::from(self.positions[corner as usize]));
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            for (place, corner) in corners.into_iter().enumerate() {
+                if !is_open[corner as usize] || normal == Vec3::ZERO {
+                    continue;
+                }
+                let known = (corner, normal.to_array().map(f32::to_bits));
+                self.indices[index][place] = *copies.entry(known).or_insert_with(|| {
+                    let vertex = corner as usize;
+                    if self.normals[vertex] == Vec3::ZERO {
+                        self.normals[vertex] = normal;
+                        return corner;
+                    }
+                    self.positions.push(self.positions[vertex]);
+                    self.normals.push(normal);
+                    self.uvs.extend(self.uvs.get(vertex).copied());
+                    self.colors.extend(self.colors.get(vertex).copied());
+                    (self.positions.len() - 1) as u32
+                });
+            }
+        }
+    }
 }
 
 /// Full sphere in world space, or in the space of its object.
@@ -176,4 +214,30 @@ pub struct AreaLight {
     pub two_sided: bool,
     /// Samples of each emitting triangle or sphere per point, for `directlighting` with strategy `all`.
     pub samples: u32,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn zero_normals_become_those_of_the_triangles() {
+        // Two walls that meet in the edge from 0 to 1. The normal of corner 3 is given.
+        let mut mesh = TriangleMesh {
+            positions: vec![[0., 0., 0.], [0., 0., 1.], [1., 0., 0.], [0., 1., 0.]],
+            indices: vec![[0, 2, 1], [0, 1, 3]],
+            normals: vec![Vec3::ZERO, Vec3::ZERO, Vec3::ZERO, Vec3::Z],
+            uvs: vec![Vec2::X; 4],
+            ..TriangleMesh::default()
+        };
+        mesh.fill_normals();
+        assert_eq!(mesh.indices, [[0, 2, 1], [4, 5, 3]]);
+        assert_eq!(mesh.positions[4..], [[0., 0., 0.], [0., 0., 1.]]);
+        let [x, y, z] = [Vec3::NEG_X, Vec3::NEG_Y, Vec3::Z];
+        assert_eq!(mesh.normals, [y, y, y, z, x, x]);
+        assert_eq!(mesh.uvs.len(), 6);
+        mesh.normals.fill(Vec3::ZERO);
+        mesh.fill_normals();
+        assert!(mesh.normals.is_empty());
+    }
 }
