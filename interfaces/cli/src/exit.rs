@@ -158,7 +158,7 @@ impl From<antumbra_lab::Error> for Failure {
 /// How much is said.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Loudness {
-    /// Only errors and warnings: `-q`.
+    /// Only errors: `-q`.
     Quiet,
     /// The usual.
     Usual,
@@ -175,7 +175,7 @@ pub fn set_loudness(loudness: Loudness) {
     LOUDNESS.store(loudness as u8, Ordering::Relaxed);
 }
 
-/// Whether only errors and warnings are said.
+/// Whether only errors are said.
 pub fn is_quiet() -> bool {
     LOUDNESS.load(Ordering::Relaxed) == Loudness::Quiet as u8
 }
@@ -190,20 +190,24 @@ pub fn is_terminal() -> bool {
     io::stderr().is_terminal()
 }
 
-/// Prints an error, a warning, or a requested text. On a terminal long lines are broken between words. Nobody may be
-/// listening: failing to say it is no failure.
+/// Prints an error, a requested text or, unless `-q` is given, a warning. On a terminal long lines are broken between words.
+/// Nobody may be listening: failing to say it is no failure.
 pub fn say(text: fmt::Arguments<'_>) {
+    let text = text.to_string();
+    if is_quiet() && text.starts_with("warning: ") {
+        return;
+    }
     let mut drawn = DRAWN.lock().unwrap_or_else(PoisonError::into_inner);
     let mut out = io::stderr().lock();
     erase(&mut drawn, &mut out);
     let _ = if is_terminal() {
-        writeln!(out, "{}", wrapped(&text.to_string()))
+        writeln!(out, "{}", wrapped(&text))
     } else {
         writeln!(out, "{text}")
     };
 }
 
-/// Prints a message about the work, unless `-q` is given.
+/// Prints a message about the work or a file, unless `-q` is given.
 pub fn tell(text: fmt::Arguments<'_>) {
     if !is_quiet() {
         say(text);

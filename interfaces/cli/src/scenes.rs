@@ -41,19 +41,29 @@ pub fn set_tolerance(strict: bool, skip_unsupported: bool) {
 }
 
 /// Options of readers, with the tolerance that was set.
-fn options(max_memory: MemorySize) -> Options {
+fn options(max_memory: MemorySize, looks: bool) -> Options {
     Options {
         max_memory,
+        looks,
         strict: STRICT.load(Ordering::Relaxed),
         skip_unsupported: SKIP.load(Ordering::Relaxed),
         orders: ORDERS.map(Order::name).to_vec(),
     }
 }
 
-/// Reads or generates a scene, and prints the reader's warnings and notes.
+/// Reads or generates a scene for a job that uses no materials, and prints the reader's warnings and notes.
 pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
+    read(name, max_memory, false)
+}
+
+/// Reads or generates a scene with its materials, and prints the reader's warnings and notes.
+pub fn load_with_looks(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
+    read(name, max_memory, true)
+}
+
+fn read(name: &Path, max_memory: MemorySize, looks: bool) -> Result<Loaded, Failure> {
     let reading = progress::doing(&name.to_string_lossy(), "reading");
-    let options = options(max_memory);
+    let options = options(max_memory, looks);
     let loaded = match name == Path::new(STDIN) {
         true => antumbra_load::load_text(standard_input(max_memory)?, &options),
         false => antumbra_load::load(name, &options),
@@ -66,16 +76,16 @@ pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
         false => MOST_NOTES,
     };
     for warning in loaded.warnings.iter().take(most) {
-        say(format_args!("{warning}"));
+        tell(format_args!("{warning}"));
     }
     if loaded.warnings.len() > most {
         let more = loaded.warnings.len() - most;
-        say(format_args!("and {more} more warnings; -v shows all"));
+        tell(format_args!("and {more} more warnings; -v shows all"));
     }
     // Every feature that is left out is named.
     let is_warning = |note: &&Diagnostic| note.severity == Severity::Warning;
     for warning in loaded.notes.iter().filter(is_warning) {
-        say(format_args!("{warning}"));
+        tell(format_args!("{warning}"));
     }
     let notes = || loaded.notes.iter().filter(|note| !is_warning(note));
     for note in notes().take(most) {
@@ -94,12 +104,12 @@ pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
 /// Reads a height raster without making a mesh of it, and prints the reader's warnings.
 pub fn load_heights(name: &Path, max_memory: MemorySize) -> Result<Heights, Failure> {
     let reading = progress::doing(&name.to_string_lossy(), "reading");
-    let heights = antumbra_load::load_heights(name, &options(max_memory));
+    let heights = antumbra_load::load_heights(name, &options(max_memory, false));
     drop(reading);
     interrupt::check()?;
     let heights = heights?;
     for warning in &heights.warnings {
-        say(format_args!("{warning}"));
+        tell(format_args!("{warning}"));
     }
     Ok(heights)
 }
@@ -126,7 +136,7 @@ pub fn load_each(names: &[PathBuf], max_memory: MemorySize) -> Result<Vec<Loaded
     let mut all = Vec::<Loaded>::new();
     let mut refused = Vec::new();
     for name in names {
-        match load(name, max_memory) {
+        match load_with_looks(name, max_memory) {
             Ok(loaded) => all.push(loaded),
             Err(Failure::Scene(text)) => refused.push((name, text)),
             Err(failure) => return Err(failure),

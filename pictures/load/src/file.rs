@@ -10,7 +10,7 @@ use antumbra_pbrt::{Diagnostic, Times};
 use antumbra_raster::RasterCells;
 use antumbra_scene::{Geometry, Material, Param, Scene, Shape, Texture, TriangleMesh, builtin};
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use crate::Error;
 use crate::estimate;
@@ -30,6 +30,8 @@ pub struct Options {
     pub max_memory: MemorySize,
     /// Whether warnings about a file, such as missing materials and images of a mesh, are errors.
     pub strict: bool,
+    /// Whether materials, textures and images of mesh files are read, and missing ones warned of. Bakes use none.
+    pub looks: bool,
     /// Whether features of `.pbrt` files that are not supported are left out with warnings. Otherwise they are errors.
     pub skip_unsupported: bool,
     /// Names of child orders that a `.pbrt` file may request.
@@ -42,6 +44,7 @@ impl Default for Options {
         Self {
             max_memory: MemorySize::of_machine(),
             strict: false,
+            looks: true,
             skip_unsupported: false,
             orders: Order::ALL.map(Order::name).to_vec(),
         }
@@ -200,12 +203,17 @@ fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> 
                 path: path.to_path_buf(),
             });
         }
-        "ply" => plain_mesh(
-            path,
-            antumbra_pbrt::load_colored_ply_within(path, limit, origin)?,
-        ),
+        "ply" => {
+            let ply = antumbra_pbrt::load_colored_ply_within(path, limit, origin)?;
+            let mut loaded = plain_mesh(path, (ply.mesh, ply.note));
+            loaded.warnings.extend(ply.warning.map(|warning| Warning {
+                place: path.display().to_string(),
+                text: warning.located(),
+            }));
+            loaded
+        }
         "stl" => plain_mesh(path, load_stl(path, limit, origin)?),
-        "obj" => of_model(path, load_obj(path, limit, origin)?),
+        "obj" => of_model(path, load_obj(path, limit, origin, options.looks)?),
         "gltf" | "glb" => of_model(path, load_gltf(path, limit, origin)?),
         "tif" | "tiff" | "asc" | "npy" => terrain::load(path, stem(path), limit, origin)?,
         _ if path.is_dir() => {
@@ -233,7 +241,8 @@ fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> 
             path: path.to_path_buf(),
         });
     }
-    if loaded.scene.stored_shapes().all(is_invisible) {
+    fill_normals(&mut loaded.scene);
+    if options.looks && loaded.scene.stored_shapes().all(is_invisible) {
         loaded.is_invisible = true;
         loaded.warnings.push(Warning {
             place: path.display().to_string(),
@@ -243,6 +252,19 @@ fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> 
     loaded.inputs.push(path.to_path_buf());
     loaded.scene.origin = origin;
     Ok(loaded)
+}
+
+/// Gives corners without a normal the normal of their face, where other corners have one.
+fn fill_normals(scene: &mut Scene) {
+    let objects = scene.objects.iter_mut();
+    let of_objects = objects.flat_map(|object| &mut object.shapes);
+    for shape in scene.shapes.iter_mut().chain(of_objects) {
+        if let Geometry::Mesh(mesh) = &mut shape.geometry
+            && mesh.normals.contains(&Vec3::ZERO)
+        {
+            Arc::make_mut(mesh).fill_normals();
+        }
+    }
 }
 
 /// Whether the alpha mask of a shape is 0 everywhere.
@@ -261,7 +283,7 @@ fn is_invisible(shape: &Shape) -> bool {
 }
 
 /// A mesh without a material of its own, in the colours of its vertices if it has any.
-fn plain_mesh(path: &Path, mesh: TriangleMesh) -> Loaded {
+fn plain_mesh(path: &Path, (mesh, note): (TriangleMesh, Option<String>)) -> Loaded {
     let material = if mesh.colors.is_empty() {
         plain_material()
     } else {
@@ -272,6 +294,7 @@ fn plain_mesh(path: &Path, mesh: TriangleMesh) -> Loaded {
     };
     Loaded {
         stage: Some(OwnStage::default()),
+        left_out: note.into_iter().collect(),
         ..Loaded::plain(stage::scene_of_mesh(stem(path), mesh, material))
     }
 }

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use antumbra_load::{Error, MemorySize, Options, Up, load};
-use antumbra_scene::{Light, Scene};
+use antumbra_scene::{Geometry, Light, Scene};
 
 const TETRAHEDRON: &str =
     "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\nf 1 4 2\nf 2 4 3\n";
@@ -51,9 +51,9 @@ fn mistakes_name_their_place() {
     assert_eq!(places, [(path, 2, 3)]);
 
     let path = folder.path().join("broken.obj");
-    fs::write(&path, "v 0 0 0\noops\n").expect("a file");
+    fs::write(&path, "v 0 0 0\nv oops\n").expect("a file");
     let text = error(&path).to_string();
-    assert!(text.contains("broken.obj:2:1: error:"), "{text}");
+    assert!(text.contains("broken.obj:2:3: error:"), "{text}");
 
     let missing = error(&folder.path().join("missing.pbrt"));
     assert!(!missing.names_places() && missing.to_string().contains("missing.pbrt"));
@@ -88,6 +88,46 @@ fn warnings_are_errors_if_strict() {
     assert!(text.starts_with(&start), "{text}");
     fs::write(&path, TETRAHEDRON).expect("a file");
     assert!(load(&path, &strict).is_ok());
+}
+
+#[test]
+fn bakes_are_not_warned_of_materials() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("thing.obj");
+    let text = format!("mtllib a.mtl\nusemtl a\n{TETRAHEDRON}oops\n");
+    fs::write(&path, text).expect("a file");
+    let mtl = "newmtl a\nKt 1\nmap_Kd no.png\nd 0\nnewmtl b\nTr 1\n";
+    fs::write(folder.path().join("a.mtl"), mtl).expect("a file");
+    let warnings = |looks: bool| {
+        let options = Options {
+            looks,
+            ..Options::default()
+        };
+        let loaded = load(&path, &options).expect("a scene");
+        assert_eq!(loaded.scene.triangle_count(), 4);
+        (loaded.warnings.len(), loaded.left_out.len())
+    };
+    assert_eq!(warnings(true), (3, 1));
+    assert_eq!(warnings(false), (1, 0));
+}
+
+#[test]
+fn zero_normals_beside_others_become_those_of_faces() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let path = folder.path().join("thing.obj");
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 0\nvn 1 0 0\nf 1//1 2//1 3//2\n";
+    fs::write(&path, text).expect("a file");
+    let loaded = load(&path, &Options::default()).expect("a scene");
+    let Geometry::Mesh(mesh) = &loaded.scene.shapes[0].geometry else {
+        panic!("a mesh");
+    };
+    let normals: Vec<_> = mesh
+        .normals
+        .iter()
+        .map(|normal| normal.to_array())
+        .collect();
+    assert_eq!(normals, [[0., 0., 1.], [0., 0., 1.], [1., 0., 0.]]);
+    assert!(loaded.warnings.is_empty());
 }
 
 #[test]

@@ -17,14 +17,21 @@ const FACET: usize = 50;
 /// Bytes of memory per triangle beside the file: corners, and an entry of the table of vertices for each.
 const PER_TRIANGLE: u64 = 12 + 3 * (12 + 24);
 
+/// Mesh, and a note about what was not read.
+type Noted = (TriangleMesh, Option<String>);
+
 /// Reads an STL file, within `max_bytes` of memory for the file and for its mesh. Positions are measured from `origin`, and
-/// rounded after that.
+/// rounded after that. The second value is a note, if bytes follow the triangles of a binary file.
 ///
 /// Positions may be NaN or infinite.
 ///
 /// # Errors
 /// [`Error::Io`]. [`Error::Broken`] with the first mistake and its line or byte.
-pub fn load_stl(path: &Path, max_bytes: u64, origin: DVec3) -> Result<TriangleMesh, Error> {
+pub fn load_stl(
+    path: &Path,
+    max_bytes: u64,
+    origin: DVec3,
+) -> Result<(TriangleMesh, Option<String>), Error> {
     let bytes = file::read(path, max_bytes, |_| Ok(())).map_err(Error::io(path))?;
     parse(&bytes, max_bytes, origin)
         .map_err(|mistake| Error::Broken(vec![format!("{}:{mistake}", path.display())]))
@@ -34,21 +41,28 @@ pub fn load_stl(path: &Path, max_bytes: u64, origin: DVec3) -> Result<TriangleMe
 ///
 /// # Errors
 /// As [`load_stl`].
-pub fn parse_stl(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Error> {
+pub fn parse_stl(bytes: &[u8], path: &Path) -> Result<(TriangleMesh, Option<String>), Error> {
     parse(bytes, u64::MAX, DVec3::ZERO)
         .map_err(|mistake| Error::Broken(vec![format!("{}:{mistake}", path.display())]))
 }
 
-fn parse(bytes: &[u8], max_bytes: u64, origin: DVec3) -> Result<TriangleMesh, String> {
+fn parse(bytes: &[u8], max_bytes: u64, origin: DVec3) -> Result<Noted, String> {
     // Binary files may begin with `solid` as well, so the size decides.
     let count = bytes.get(80..HEADER).and_then(<[u8]>::first_chunk::<4>);
     let count = count.map(|&count| u32::from_le_bytes(count) as usize);
-    let is_binary = count.is_some_and(|count| bytes.len() == HEADER + FACET * count);
-    if is_binary {
-        return binary(&bytes[HEADER..], max_bytes, origin);
+    let behind = count.and_then(|count| bytes.len().checked_sub(HEADER + FACET * count));
+    if behind == Some(0) {
+        return Ok((binary(&bytes[HEADER..], max_bytes, origin)?, None));
     }
-    if bytes.trim_ascii_start().starts_with(b"solid") && !bytes.contains(&0) {
-        return ascii(bytes, max_bytes, origin);
+    let text = antumbra_scene::without_mark(bytes).trim_ascii_start();
+    let first = text.get(..5).unwrap_or_default();
+    if first.eq_ignore_ascii_case(b"solid") && !bytes.contains(&0) {
+        return Ok((ascii(bytes, max_bytes, origin)?, None));
+    }
+    if let (Some(count @ 1..), Some(behind)) = (count, behind) {
+        let facets = &bytes[HEADER..HEADER + FACET * count];
+        let note = format!("{behind} bytes behind the last triangle are not read");
+        return Ok((binary(facets, max_bytes, origin)?, Some(note)));
     }
     Err(match count {
         Some(count) => format!(
@@ -124,7 +138,7 @@ fn ascii(bytes: &[u8], max_bytes: u64, origin: DVec3) -> Result<TriangleMesh, St
     let lines = bytes.split(|&byte| byte == b'\n');
     for (index, line) in lines.enumerate() {
         let at = |reason: String| format!("{}: error: {reason}", index + 1);
-        let text = String::from_utf8_lossy(line);
+        let text = String::from_utf8_lossy(antumbra_scene::without_mark(line));
         let mut words = text.split_ascii_whitespace();
         match words.next().map(str::to_ascii_lowercase).as_deref() {
             Some("vertex") => {
@@ -179,6 +193,13 @@ mod tests {
         bytes.extend(facet(A));
         bytes.extend(facet(B));
         let of_binary = parse(&bytes, u64::MAX, DVec3::ZERO).expect("a mesh");
+        bytes.extend(b"more");
+        let (mesh, note) = parse(&bytes, u64::MAX, DVec3::ZERO).expect("a mesh");
+        assert_eq!(mesh, of_binary.0);
+        assert_eq!(
+            note.as_deref(),
+            Some("4 bytes behind the last triangle are not read")
+        );
         let mut text = "solid two words\n".to_owned();
         for facet in [A, B] {
             text += " facet normal 0 0 1\n  outer loop\r\n";
@@ -190,6 +211,10 @@ mod tests {
         text += "endsolid\n";
         let of_text = parse(text.as_bytes(), u64::MAX, DVec3::ZERO).expect("a mesh");
         assert_eq!(of_binary, of_text);
+        let text = format!("\u{feff}{}", text.to_uppercase());
+        let of_capitals = parse(text.as_bytes(), u64::MAX, DVec3::ZERO).expect("a mesh");
+        assert_eq!(of_capitals, of_text);
+        let (of_text, _) = of_text;
         assert_eq!(of_text.indices, [[0, 1, 2], [1, 3, 2]]);
         assert_eq!(of_text.positions.len(), 4);
     }

@@ -80,7 +80,9 @@ use antumbra_scene::Scene;
 use glam::DVec3;
 
 pub use diagnostic::{Diagnostic, Diagnostics, Severity};
-pub use ply::{PlyError, PlyPlace, load_colored_ply_within, load_ply, load_ply_within, parse_ply};
+pub use ply::{
+    ColoredPly, PlyError, PlyPlace, load_colored_ply_within, load_ply, load_ply_within, parse_ply,
+};
 
 /// Options of reading: names and memory that a scene may use.
 #[derive(Clone, Copy, Debug, Default)]

@@ -116,8 +116,8 @@ pub struct Cli {
     pub max_memory: Option<MemorySize>,
     /// Take warnings about files as errors
     ///
-    /// If absent, a mesh is shown without materials and images that are missing, and a warning says so; a .pbrt file with
-    /// unknown materials is read as by pbrt. With it, they are errors with exit code 65.
+    /// If absent, a mesh is read without what its file says wrongly, such as unknown statements and missing materials, and a
+    /// warning says so; a .pbrt file with unknown materials is read as by pbrt. With it, they are errors with exit code 65.
     #[arg(long, global = true, help_heading = heading::MACHINE)]
     pub strict: bool,
     /// Leave out what is not supported of .pbrt files
@@ -126,7 +126,7 @@ pub struct Cli {
     /// rest is rendered: materials as matte, shapes, lights and media not at all.
     #[arg(long, global = true, conflicts_with = "strict", help_heading = heading::MACHINE)]
     pub skip_unsupported: bool,
-    /// Print only errors and warnings
+    /// Print only errors
     #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = heading::MACHINE)]
     pub quiet: bool,
     /// Print more: all notes, the tree, where the time went

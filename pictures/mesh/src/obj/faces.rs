@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::str::FromStr;
 
-use antumbra_scene::{Rgb, TriangleMesh};
+use antumbra_scene::{Rgb, TriangleMesh, polygon};
 use glam::{DVec3, Vec2, Vec3};
 
 use super::scan::{Mistakes, number};
@@ -32,29 +32,19 @@ fn linear(encoded: f32) -> f32 {
     }
 }
 
-/// First `N` numbers of a statement.
+/// First `N` numbers of a statement. Errors are columns and reasons.
 fn numbers<'a, T: Copy + Default + FromStr, const N: usize>(
     column: usize,
     words: &mut impl Iterator<Item = (usize, &'a [u8])>,
-    mistakes: &mut Mistakes,
-) -> Option<[T; N]> {
+) -> Result<[T; N], (usize, String)> {
     let mut values = [T::default(); N];
     for (index, value) in values.iter_mut().enumerate() {
-        let Some((place, word)) = words.next() else {
-            mistakes.add(
-                column,
-                format!("{N} numbers are needed here, and there are {index}"),
-            );
-            return None;
-        };
-        let Some(found) = number(word) else {
-            let word = String::from_utf8_lossy(word);
-            mistakes.add(place, format!("`{word}` is not a number"));
-            return None;
-        };
-        *value = found;
+        let few = || format!("{N} numbers are needed here, and there are {index}");
+        let (place, word) = words.next().ok_or_else(|| (column, few()))?;
+        let bad = || format!("`{}` is not a number", String::from_utf8_lossy(word));
+        *value = number(word).ok_or_else(|| (place, bad()))?;
     }
-    Some(values)
+    Ok(values)
 }
 
 impl Lists {
@@ -72,7 +62,10 @@ impl Lists {
         mut words: impl Iterator<Item = (usize, &'a [u8])> + Clone,
         mistakes: &mut Mistakes,
     ) {
-        let position = numbers(column, &mut words, mistakes).unwrap_or([f64::NAN; 3]);
+        let position = numbers(column, &mut words).unwrap_or_else(|(column, reason)| {
+            mistakes.add(column, reason);
+            [f64::NAN; 3]
+        });
         let rest: Vec<f32> = words.filter_map(|(_, word)| number(word)).collect();
         if let [r, g, b, ..] = rest[..]
             && self.colors.len() == self.positions.len()
@@ -83,26 +76,40 @@ impl Lists {
         self.positions.push(position.as_vec3().into());
     }
 
-    /// Reads `vt u v`. A missing v is 0.
+    /// Reads `vt u v`. A missing v is 0, and so is what cannot be read.
     pub fn uv<'a>(
         &mut self,
         column: usize,
         mut words: impl Iterator<Item = (usize, &'a [u8])>,
         mistakes: &mut Mistakes,
     ) {
-        let [u] = numbers(column, &mut words, mistakes).unwrap_or([0.0]);
+        let [u] = numbers(column, &mut words).unwrap_or_else(|(column, reason)| {
+            mistakes.warn(
+                mistakes.line,
+                column,
+                format!("{reason}, so `vt` counts as 0"),
+            );
+            [0.0]
+        });
         let v = words.next().and_then(|(_, word)| number(word));
         self.uvs.push(Vec2::new(u, v.unwrap_or(0.0)));
     }
 
-    /// Reads `vn x y z`.
+    /// Reads `vn x y z`. What cannot be read is the zero vector, as if there were no normal.
     pub fn normal<'a>(
         &mut self,
         column: usize,
         mut words: impl Iterator<Item = (usize, &'a [u8])>,
         mistakes: &mut Mistakes,
     ) {
-        let normal = numbers(column, &mut words, mistakes).unwrap_or([0.0_f32; 3]);
+        let normal = numbers(column, &mut words).unwrap_or_else(|(column, reason)| {
+            mistakes.warn(
+                mistakes.line,
+                column,
+                format!("{reason}, so `vn` is left out"),
+            );
+            [0.0_f32; 3]
+        });
         self.normals.push(Vec3::from(normal).normalize_or_zero());
     }
 
@@ -115,11 +122,11 @@ impl Lists {
         [self.positions.len(), self.uvs.len(), self.normals.len()].map(|count| count as i64)
     }
 
-    /// Mesh of the faces of one material. All corners must exist.
+    /// Mesh of the faces of one material. All their vertices must exist. A missing normal is the zero vector.
     pub fn mesh(&self, part: &Part) -> TriangleMesh {
         let corners = || part.triangles.iter().flatten();
-        let has_uvs = corners().any(|corner| corner[1] != NONE);
-        let has_normals = corners().all(|corner| corner[2] != NONE);
+        let has_uvs = corners().any(|corner| (corner[1] as usize) < self.uvs.len());
+        let has_normals = corners().any(|corner| (corner[2] as usize) < self.normals.len());
         if part.is_all && !has_uvs && !has_normals {
             let colors = if self.has_colors() {
                 self.colors.clone()
@@ -141,7 +148,6 @@ impl Lists {
         let mut known: HashMap<[u32; 3], u32> = HashMap::new();
         for triangle in &part.triangles {
             let indices = triangle.map(|[position, uv, normal]| {
-                let normal = if has_normals { normal } else { NONE };
                 *known.entry([position, uv, normal]).or_insert_with(|| {
                     mesh.positions.push(self.positions[position as usize]);
                     if has_uvs {
@@ -149,7 +155,8 @@ impl Lists {
                         mesh.uvs.push(uv.unwrap_or_default());
                     }
                     if has_normals {
-                        mesh.normals.push(self.normals[normal as usize]);
+                        let normal = self.normals.get(normal as usize).copied();
+                        mesh.normals.push(normal.unwrap_or_default());
                     }
                     if self.has_colors() {
                         mesh.colors.push(self.colors[position as usize]);
@@ -171,8 +178,10 @@ pub(super) struct Part {
     pub material: Option<Used>,
     /// Consecutive triangles of one object and one group, each a place in the list of names, and their number.
     runs: Vec<([usize; 2], usize)>,
-    /// Vertex, texture coordinate and normal of every corner.
+    /// Vertex, texture coordinate and normal of every corner. The last two may not exist.
     triangles: Vec<[[u32; 3]; 3]>,
+    /// First triangle and number of triangles of each polygon of more than three corners.
+    polygons: Vec<(usize, usize)>,
     /// Whether these are all faces of the file.
     is_all: bool,
 }
@@ -189,9 +198,18 @@ pub(super) struct Faces {
     owners: [usize; 2],
     /// Corners that refer to what may still follow: line, column, kind and number.
     open: Vec<(usize, usize, usize, i64)>,
+    /// Number of faces of fewer than three corners, which are left out.
+    pub flat: u64,
 }
 
 const KINDS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
+
+/// Warning about corners that name a texture coordinate or a normal that does not exist.
+fn lacks(kind: usize) -> String {
+    let instead = ["", "0 is", "that of the face is"][kind];
+    let what = KINDS[kind];
+    format!("a corner names a {what} that is not in the file; {instead} used instead")
+}
 
 impl Faces {
     /// Sets the material of the faces that follow. An empty name is none.
@@ -217,7 +235,6 @@ impl Faces {
     /// Reads `f`.
     pub fn face<'a>(
         &mut self,
-        column: usize,
         words: impl Iterator<Item = (usize, &'a [u8])>,
         lists: &Lists,
         mistakes: &mut Mistakes,
@@ -229,8 +246,8 @@ impl Faces {
                 None => return,
             }
         }
-        if corners.is_empty() {
-            mistakes.add(column, "a face needs three corners".to_owned());
+        if corners.len() < 3 {
+            self.flat += 1;
             return;
         }
         let name = self.current.as_ref().map(|(name, _, _)| name.clone());
@@ -241,17 +258,24 @@ impl Faces {
                 material: current.clone(),
                 runs: Vec::new(),
                 triangles: Vec::new(),
+                polygons: Vec::new(),
                 is_all: false,
             });
             parts.len() - 1
         });
         let Part {
-            triangles, runs, ..
+            triangles,
+            polygons,
+            runs,
+            ..
         } = &mut self.parts[part];
+        let count = corners.len() - 2;
+        if count > 1 {
+            polygons.push((triangles.len(), count));
+        }
         for pair in corners.windows(2).skip(1) {
             triangles.push([corners[0], pair[0], pair[1]]);
         }
-        let count = corners.len().saturating_sub(2);
         match runs.last_mut() {
             Some((owners, sum)) if *owners == self.owners => *sum += count,
             _ => runs.push((self.owners, count)),
@@ -285,6 +309,10 @@ impl Faces {
             let count = lists.counts()[kind];
             let what = KINDS[kind];
             let place = if index < 0 { count + index } else { index - 1 };
+            if kind > 0 && (index == 0 || index < -count || place >= i64::from(NONE)) {
+                mistakes.warn(mistakes.line, column, lacks(kind));
+                continue;
+            }
             if index == 0 || index < -count {
                 let text = match count {
                     0 => format!("there is no {what} {index}: none stands before it"),
@@ -315,17 +343,30 @@ impl Faces {
         Some(corner)
     }
 
-    /// Reports corners that refer to what does not exist.
-    pub fn check(&self, lists: &Lists, mistakes: &mut Mistakes) {
+    /// Reports corners that refer to what does not exist, and splits polygons with inward corners, at the end of a file.
+    pub fn finish(&mut self, lists: &Lists, mistakes: &mut Mistakes) {
         for &(line, column, kind, index) in &self.open {
             let count = lists.counts()[kind];
-            if index > count {
+            if index > count && kind > 0 {
+                mistakes.warn(line, column, lacks(kind));
+            } else if index > count {
                 let what = KINDS[kind];
                 mistakes.at(
                     line,
                     column,
                     format!("there is no {what} {index}: the file has {count}"),
                 );
+            }
+        }
+        if !mistakes.is_empty() {
+            return;
+        }
+        for part in &mut self.parts {
+            for &(first, count) in &part.polygons {
+                let fan = &mut part.triangles[first..first + count];
+                polygon::split(fan, |corner| {
+                    Vec3::from(lists.positions[corner[0] as usize]).as_dvec3()
+                });
             }
         }
     }

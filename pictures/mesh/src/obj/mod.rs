@@ -1,7 +1,8 @@
 //! Wavefront OBJ: faces with texture coordinates, normals and vertex colours, and the materials of `.mtl` files.
 //!
 //! Faces with one material make one mesh, whatever their groups. Polygons become fans of triangles around their first
-//! corner. Free-form curves, points and lines are left out with a note.
+//! corner, or other triangles if they have inward corners. Points and lines are left out with a note, and everything else
+//! that is not read with a warning.
 //!
 //! - `scan.rs`: words and numbers with their columns
 //! - `faces.rs`: corners of faces, and the meshes that they make
@@ -14,7 +15,6 @@ mod mtl;
 mod scan;
 
 use std::collections::HashMap;
-use std::io;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -39,11 +39,6 @@ const SILENT: &[&str] = &[
     "shadow_obj",
     "trace_obj",
 ];
-/// Statements that are left out with a note.
-const LEFT_OUT: &[&str] = &[
-    "vp", "l", "p", "maplib", "usemap", "curv", "curv2", "surf", "parm", "cstype", "deg", "end",
-    "trim", "hole", "scrv", "sp", "con", "bmat", "step", "ctech", "stech", "call", "csh",
-];
 
 /// Bytes of memory for a vertex, a texture coordinate or a normal, and for a corner with its entry of a hash table.
 const PER_VERTEX: u64 = 24;
@@ -51,23 +46,26 @@ const PER_CORNER: u64 = 56;
 /// Bytes of memory for the name of an object or a group, beside its text.
 const PER_NAME: u64 = 48;
 
-/// Reads an OBJ file with its materials and textures, within `max_bytes` of memory for each of the three. Positions are
-/// measured from `origin`, and rounded after that.
+/// Reads an OBJ file, within `max_bytes` of memory for each of geometry, materials and textures. Positions are measured from
+/// `origin`, and rounded after that. Without `looks`, everything is plain grey and no other file is read.
 ///
 /// A file without faces gives a model without shapes. Positions may be NaN or infinite.
 ///
 /// # Errors
-/// [`Error::Io`], or [`Error::Broken`] with the first mistakes: unknown statements, corners that refer to missing
-/// vertices, words that are no numbers, damaged images. Missing libraries, materials and images are
-/// [warnings](Model::warnings), and faces with them are plain grey.
-pub fn load_obj(path: &Path, max_bytes: u64, origin: DVec3) -> Result<Model, Error> {
+/// [`Error::Io`], or [`Error::Broken`] with the first mistakes: corners that refer to missing vertices, positions that are no
+/// numbers, damaged images. Everything that leaves the geometry whole is a [warning](Model::warnings), such as unknown
+/// statements, and materials, images, normals and texture coordinates that are missing.
+pub fn load_obj(path: &Path, max_bytes: u64, origin: DVec3, looks: bool) -> Result<Model, Error> {
     let bytes = file::read(path, max_bytes, is_text).map_err(Error::io(path))?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    parse_within(&bytes, path, Some(folder), max_bytes, origin)
+    let folder = path.parent().filter(|_| looks);
+    parse_within(&bytes, path, folder, max_bytes, origin)
 }
 
 /// A file without text is refused before it is read.
 fn is_text(start: &[u8]) -> Result<(), String> {
+    if start.starts_with(b"\xff\xfe") || start.starts_with(b"\xfe\xff") {
+        return Err("the text is UTF-16; save it as UTF-8".into());
+    }
     match start.iter().position(|&byte| byte == 0) {
         Some(place) => Err(format!("not an OBJ file: byte {place} is 0")),
         None => Ok(()),
@@ -100,13 +98,13 @@ fn parse_within(
         folder,
         lacks_library: false,
     };
-    for (index, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
-        mistakes.line = index + 1;
-        if !reader.statement(line, &mut model, &mut mistakes) {
+    for (number, line) in scan::lines(bytes) {
+        mistakes.line = number;
+        if !reader.statement(&line, &mut model, &mut mistakes) {
             break;
         }
     }
-    reader.faces.check(&reader.lists, &mut mistakes);
+    reader.faces.finish(&reader.lists, &mut mistakes);
     if !mistakes.is_empty() {
         return Err(broken(mistakes.into_lines()));
     }
@@ -118,6 +116,12 @@ fn parse_within(
         lacks_library,
         ..
     } = reader;
+    if faces.flat > 0 {
+        let count = faces.flat;
+        model.note(format!(
+            "{count} faces of fewer than three corners are left out"
+        ));
+    }
     model.names.shapes = faces.names();
     let parts = faces.into_parts();
     let opaque = opaque_instead(&parts, &materials);
@@ -202,10 +206,6 @@ struct Reader<'a> {
 impl Reader<'_> {
     /// Reads a line. `false`: there is no memory for more.
     fn statement(&mut self, line: &[u8], model: &mut Model, mistakes: &mut Mistakes) -> bool {
-        let line = match line.iter().position(|&byte| byte == b'#') {
-            Some(comment) => &line[..comment],
-            None => line,
-        };
         let mut rest = words(line);
         let Some((column, first)) = rest.next() else {
             return true;
@@ -228,7 +228,7 @@ impl Reader<'_> {
             b"v" => self.lists.vertex(column, rest, mistakes),
             b"vt" => self.lists.uv(column, rest, mistakes),
             b"vn" => self.lists.normal(column, rest, mistakes),
-            b"f" => self.faces.face(column, rest, &self.lists, mistakes),
+            b"f" => self.faces.face(rest, &self.lists, mistakes),
             b"o" | b"g" => {
                 let kind = usize::from(first == b"g");
                 let name = scan::text_after(line, column + first.len());
@@ -244,10 +244,11 @@ impl Reader<'_> {
             }
             word => {
                 let word = String::from_utf8_lossy(word);
-                if LEFT_OUT.contains(&&*word) {
-                    model.note(format!("`{word}` is left out: only faces are shown"));
+                if matches!(&*word, "l" | "p") {
+                    model.note("points and lines are left out");
                 } else if !SILENT.contains(&&*word) {
-                    mistakes.add(column, format!("unknown statement `{word}`"));
+                    let text = format!("`{word}` is unknown or not supported, and is left out");
+                    mistakes.warn(mistakes.line, column, text);
                 }
             }
         }
@@ -275,13 +276,12 @@ impl Reader<'_> {
                     }
                     model.files.push(path);
                 }
-                Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                Err(error) => {
                     self.lacks_library = true;
                     let text =
                         format!("cannot read `{name}`: {error}; its materials are plain grey");
                     mistakes.warn(mistakes.line, column, text);
                 }
-                Err(error) => mistakes.add(column, format!("cannot read `{name}`: {error}")),
             }
         }
     }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use antumbra_scene::{Rgb, Wrap};
 use glam::Vec2;
 
-use super::scan::{Mistakes, number, words};
+use super::scan::{self, Mistakes, number, words};
 use crate::Model;
 
 /// A material as its file has it. `None` is not given.
@@ -58,11 +58,8 @@ pub(super) struct Map {
 
 /// Statements without a meaning for a picture made of light: ambient colour, sharpness of reflection maps, antialiasing.
 const SILENT: &[&str] = &["Ka", "map_Ka", "sharpness", "map_aat", "aniso", "anisor"];
-const LEFT_OUT: &[&str] = &[
-    "map_Ns", "disp", "decal", "refl", "Ps", "map_Ps", "Pc", "Pcr", "map_refl",
-];
 
-/// Reads the materials of a file. Mistakes are added with their places.
+/// Reads the materials of a file. Statements that cannot be read are left out with warnings.
 pub(super) fn parse(
     bytes: &[u8],
     path: &Path,
@@ -70,19 +67,15 @@ pub(super) fn parse(
     mistakes: &mut Mistakes,
 ) -> Vec<Mtl> {
     let mut all: Vec<Mtl> = Vec::new();
-    for (index, line) in bytes.split(|&byte| byte == b'\n').enumerate() {
-        let line_number = index + 1;
-        let text = match line.iter().position(|&byte| byte == b'#') {
-            Some(comment) => &line[..comment],
-            None => line,
-        };
+    for (line_number, text) in scan::lines(bytes) {
+        let text = &*text;
         let all_words: Vec<(usize, &[u8])> = words(text).collect();
         let Some(&(column, first)) = all_words.first() else {
             continue;
         };
         let word = String::from_utf8_lossy(first).into_owned();
         if word == "newmtl" {
-            let name = super::scan::text_after(text, column + first.len());
+            let name = scan::text_after(text, column + first.len());
             all.push(Mtl {
                 name,
                 ..Mtl::default()
@@ -90,10 +83,11 @@ pub(super) fn parse(
             continue;
         }
         let mut wrong = |column: usize, reason: String| {
-            mistakes.of_file(path, line_number, column, reason);
+            let text = format!("{reason}; `{word}` is left out");
+            mistakes.warn_of_file(path, line_number, column, text);
         };
         let Some(mtl) = all.last_mut() else {
-            wrong(column, format!("`{word}` stands before the first `newmtl`"));
+            wrong(column, "there is no `newmtl` before it".into());
             continue;
         };
         let mut statement = Statement {
@@ -139,12 +133,10 @@ pub(super) fn parse(
             "map_Pr" => mtl.map_roughness = map(&mut statement),
             "map_Pm" => mtl.map_metallic = map(&mut statement),
             word if SILENT.contains(&word) => {}
-            word if LEFT_OUT.contains(&word) => {
-                model.note(format!(
-                    "`{word}` of materials is not supported and is left out"
-                ));
+            word => {
+                let text = format!("`{word}` is unknown or not supported, and is left out");
+                mistakes.warn_of_file(path, line_number, column, text);
             }
-            word => wrong(column, format!("unknown statement `{word}`")),
         }
     }
     for mtl in &all {

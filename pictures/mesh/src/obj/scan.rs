@@ -1,9 +1,41 @@
-//! Words and numbers of a line with their columns, and mistakes with their places.
+//! Lines, words and numbers with their places, and mistakes and warnings with theirs.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use crate::Warning;
+
+/// Lines without their comments, with the numbers of their first lines from 1. A line that ends with `\` goes on in the next.
+pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, [u8]>)> {
+    fn code(line: &[u8]) -> &[u8] {
+        match line.iter().position(|&byte| byte == b'#') {
+            Some(comment) => &line[..comment],
+            None => line,
+        }
+    }
+    let text = antumbra_scene::without_mark(bytes);
+    let mut rest = (1..).zip(text.split(|&byte| byte == b'\n'));
+    std::iter::from_fn(move || {
+        let (number, line) = rest.next()?;
+        let mut whole = Cow::Borrowed(code(line));
+        // A comment that ends so is complete.
+        let goes_on = |line: &[u8]| {
+            let start = line.trim_ascii_end().strip_suffix(b"\\")?;
+            (code(line) == line).then_some(line.len() - start.len())
+        };
+        let mut last = line;
+        while let Some(end) = goes_on(last) {
+            let kept = whole.len() - end;
+            let joined = whole.to_mut();
+            joined.truncate(kept);
+            joined.push(b' ');
+            last = rest.next().map_or(&[], |(_, next)| next);
+            joined.extend_from_slice(code(last));
+        }
+        Some((number, whole))
+    })
+}
 
 /// Words of a line, with their columns in bytes from 1.
 pub(super) fn words(line: &[u8]) -> impl Iterator<Item = (usize, &[u8])> + Clone {
@@ -49,7 +81,8 @@ pub(super) struct Mistakes {
     found: Vec<(usize, usize, String)>,
     /// Mistakes of other files, as lines of text.
     elsewhere: Vec<String>,
-    warnings: Vec<Warning>,
+    /// Warnings, and how many there are of each kind.
+    warnings: Vec<(Warning, u64)>,
 }
 
 /// Mistakes after which no more are kept.
@@ -89,23 +122,36 @@ impl Mistakes {
             .push(format!("{path}:{line}:{column}: error: {text}"));
     }
 
-    /// Adds a warning about a place.
+    /// Adds a warning about a place. Those with the same text are one kind, of which the first place is kept.
     pub fn warn(&mut self, line: usize, column: usize, text: String) {
         self.warn_of_file(&self.path.clone(), line, column, text);
     }
 
     /// Adds a warning about a place in another file.
     pub fn warn_of_file(&mut self, path: &Path, line: usize, column: usize, text: String) {
-        let place = format!("{}:{line}:{column}", path.display());
-        let warning = Warning { place, text };
-        if self.warnings.len() < ENOUGH && !self.warnings.contains(&warning) {
-            self.warnings.push(warning);
+        if let Some((_, count)) = self
+            .warnings
+            .iter_mut()
+            .find(|(known, _)| known.text == text)
+        {
+            *count += 1;
+        } else if self.warnings.len() < ENOUGH {
+            let place = format!("{}:{line}:{column}", path.display());
+            self.warnings.push((Warning { place, text }, 1));
         }
     }
 
-    /// Removes and returns the warnings so far.
+    /// Removes and returns the warnings so far, with the number of places if there are several.
     pub fn take_warnings(&mut self) -> Vec<Warning> {
-        std::mem::take(&mut self.warnings)
+        let counted = std::mem::take(&mut self.warnings).into_iter();
+        let counted = counted.map(|(Warning { place, text }, count)| Warning {
+            place,
+            text: match count {
+                1 => text,
+                _ => format!("{text} (the first of {count} places)"),
+            },
+        });
+        counted.collect()
     }
 
     /// All mistakes in the order of their places, mistakes in other files last.

@@ -3,7 +3,7 @@
 //! The reader of elements is generic over the source of single values: words of an ASCII file, or bytes in either
 //! order.
 
-use antumbra_scene::TriangleMesh;
+use antumbra_scene::{TriangleMesh, polygon};
 use glam::{DVec3, Vec2};
 
 use super::header::{Element, Format, Header, Kind, Scalar};
@@ -20,6 +20,8 @@ trait Values {
     fn place(&self) -> PlyPlace;
     /// Number of bytes that are not read yet.
     fn remaining(&self) -> u64;
+    /// Notes that one of the items called `what` is complete.
+    fn end_item(&mut self, _what: &'static str) {}
 }
 
 /// Reason why there is no next value. The type is small, because every value is returned with it.
@@ -28,55 +30,57 @@ enum Problem {
     NotANumber,
 }
 
-/// Reads the mesh, seen from `origin`, with colours of the vertices if they are wanted and there.
+/// Reads the mesh, seen from `origin`, with colours of the vertices if they are wanted and there. Also returns how many faces
+/// have fewer than three corners.
 pub(super) fn parse(
     bytes: &[u8],
     header: &Header,
+    most_triangles: u64,
     wants_colors: bool,
     origin: DVec3,
-) -> Result<TriangleMesh, Fault> {
-    let body = &bytes[header.body..];
+) -> Result<(TriangleMesh, u64), Fault> {
+    let wanted = Wanted {
+        most_triangles,
+        wants_colors,
+        origin,
+    };
+    let at = header.body;
     match header.format {
-        Format::Ascii => read(
-            Ascii {
-                bytes: body,
+        Format::Ascii => {
+            let mut values = Ascii {
+                bytes: &bytes[at..],
                 at: 0,
                 word: 0..0,
                 line: header.body_line,
-            },
-            header,
-            wants_colors,
-            origin,
-        ),
-        Format::LittleEndian => read(
-            Binary::<false> {
-                bytes,
-                at: header.body,
-                last: header.body,
-            },
-            header,
-            wants_colors,
-            origin,
-        ),
-        Format::BigEndian => read(
-            Binary::<true> {
-                bytes,
-                at: header.body,
-                last: header.body,
-            },
-            header,
-            wants_colors,
-            origin,
-        ),
+                words: 0,
+                crowded: None,
+            };
+            let read = read(&mut values, header, &wanted);
+            values.judge(read)
+        }
+        Format::LittleEndian => {
+            let last = at;
+            read(&mut Binary::<false> { bytes, at, last }, header, &wanted)
+        }
+        Format::BigEndian => {
+            let last = at;
+            read(&mut Binary::<true> { bytes, at, last }, header, &wanted)
+        }
     }
 }
 
-fn read(
-    mut values: impl Values,
-    header: &Header,
+/// What a caller wants of a mesh.
+struct Wanted {
+    most_triangles: u64,
     wants_colors: bool,
     origin: DVec3,
-) -> Result<TriangleMesh, Fault> {
+}
+
+fn read(
+    values: &mut impl Values,
+    header: &Header,
+    wanted: &Wanted,
+) -> Result<(TriangleMesh, u64), Fault> {
     let required = |name: &str| match header.element(name) {
         Some(element) if element.count > 0 => Ok(element),
         Some(element) => Err(Fault::new(
@@ -88,18 +92,39 @@ fn read(
             format!("the header declares no element {name}"),
         )),
     };
-    let vertices = Vertices::new(required("vertex")?, wants_colors)?;
-    let faces = Faces::new(required("face")?, vertices.element.count)?;
+    let vertices = Vertices::new(required("vertex")?, wanted.wants_colors)?;
+    let has_strips = |element: &&Element| element.name == STRIPS && element.count > 0;
+    if !header.elements.iter().any(|element| has_strips(&element)) {
+        required("face")?;
+    }
     let mut mesh = TriangleMesh::default();
+    let mut faces = Faces {
+        vertex_count: vertices.element.count,
+        most_triangles: wanted.most_triangles.min(u32::MAX.into()),
+        corners: Vec::new(),
+        unsplit: Vec::new(),
+        flat: 0,
+    };
     for element in &header.elements {
         check_size(element, header.format, values.remaining())?;
         match element.name.as_str() {
-            "vertex" => vertices.read(&mut values, origin, &mut mesh)?,
-            "face" => faces.read(&mut values, &mut mesh)?,
-            _ => skip_element(&mut values, element, header.format)?,
+            "vertex" => vertices.read(values, wanted.origin, &mut mesh)?,
+            "face" | STRIPS if element.count > 0 => faces.read(values, element, &mut mesh)?,
+            _ => skip_element(values, element, header.format)?,
         }
     }
-    Ok(mesh)
+    for (first, count) in std::mem::take(&mut faces.unsplit) {
+        split(&mut mesh, first as usize, count as usize);
+    }
+    Ok((mesh, faces.flat))
+}
+
+/// Splits the last triangles of a mesh, or others, which are a fan, if the polygon has inward corners.
+fn split(mesh: &mut TriangleMesh, first: usize, count: usize) {
+    let positions = &mesh.positions;
+    polygon::split(&mut mesh.indices[first..first + count], |corner: u32| {
+        DVec3::from(positions[corner as usize].map(f64::from))
+    });
 }
 
 /// Compares a declared count with the rest of the file.
@@ -143,6 +168,7 @@ fn skip_element(values: &mut impl Values, element: &Element, format: Format) -> 
             skip_property(values, property.kind)
                 .map_err(|p| fault(values, p, &shorten(&element.name), index))?;
         }
+        values.end_item("item");
     }
     Ok(())
 }
@@ -275,6 +301,7 @@ impl<'a> Vertices<'a> {
                 };
                 result.map_err(|p| fault(values, p, "vertex", index))?;
             }
+            values.end_item("vertex");
             let [x, y, z, nx, ny, nz, u, v, rgb @ ..] = row;
             let position = DVec3::new(x, y, z) - origin;
             mesh.positions.push(position.as_vec3().into());
@@ -299,89 +326,127 @@ impl<'a> Vertices<'a> {
     }
 }
 
-/// Reader of the `face` element.
-struct Faces<'a> {
-    element: &'a Element,
+/// Reader of the elements `face` and `tristrips`.
+struct Faces {
     vertex_count: u64,
-    /// Index of the property that lists vertices.
-    list: usize,
+    most_triangles: u64,
+    /// Corners of the current face, or of a part of a strip.
+    corners: Vec<u32>,
+    /// First triangle and number of triangles of polygons that were read before their vertices.
+    unsplit: Vec<(u32, u32)>,
+    /// Number of faces of fewer than three corners.
+    flat: u64,
 }
 
-impl<'a> Faces<'a> {
-    fn new(element: &'a Element, vertex_count: u64) -> Result<Self, Fault> {
+/// Element of lists of vertices in which each one makes a triangle with the two before it.
+const STRIPS: &str = "tristrips";
+
+impl Faces {
+    fn read(
+        &mut self,
+        values: &mut impl Values,
+        element: &Element,
+        mesh: &mut TriangleMesh,
+    ) -> Result<(), Fault> {
         let list = ["vertex_indices", "vertex_index"]
             .iter()
             .find_map(|name| element.position(name))
             .filter(|index| matches!(element.properties[*index].kind, Kind::List { .. }));
+        let Element { name, line, .. } = element;
         let Some(list) = list else {
-            let place = PlyPlace::Line(element.line);
-            return Err(Fault::new(place, "element face has no list vertex_indices"));
+            let message = format!("element {name} has no list vertex_indices");
+            return Err(Fault::new(PlyPlace::Line(*line), message));
         };
-        Ok(Self {
-            element,
-            vertex_count,
-            list,
-        })
-    }
-
-    fn read(&self, values: &mut impl Values, mesh: &mut TriangleMesh) -> Result<(), Fault> {
-        mesh.indices.reserve(self.element.count as usize);
-        for index in 0..self.element.count {
-            for (i, property) in self.element.properties.iter().enumerate() {
+        let strips = name == STRIPS;
+        let what = if strips { "strip" } else { "face" };
+        mesh.indices.reserve(element.count as usize);
+        for index in 0..element.count {
+            for (i, property) in element.properties.iter().enumerate() {
                 match property.kind {
-                    Kind::List { count, item } if i == self.list => {
-                        self.read_face(values, index, count, item, mesh)?;
+                    Kind::List { count, item } if i == list => {
+                        let length = values.next(count).and_then(list_length);
+                        let length = length.map_err(|p| fault(values, p, what, index))?;
+                        if length.saturating_add(mesh.indices.len() as u64)
+                            > self.most_triangles + 2
+                        {
+                            return Err(self.too_many(values));
+                        }
+                        self.corners.clear();
+                        for _ in 0..length {
+                            let vertex = values.next(item);
+                            let vertex = vertex.map_err(|p| fault(values, p, what, index))?;
+                            if strips && vertex == -1.0 {
+                                self.strip(mesh);
+                                continue;
+                            }
+                            // The cast saturates, so negative numbers, NaN and fractions differ from their result.
+                            let corner = vertex as u32;
+                            if f64::from(corner) != vertex || u64::from(corner) >= self.vertex_count
+                            {
+                                return Err(self.bad_index(values, what, index, vertex));
+                            }
+                            self.corners.push(corner);
+                        }
+                        match strips {
+                            true => self.strip(mesh),
+                            false => self.face(mesh),
+                        }
                     }
                     kind => {
-                        skip_property(values, kind).map_err(|p| fault(values, p, "face", index))?
+                        skip_property(values, kind).map_err(|p| fault(values, p, what, index))?
                     }
                 }
             }
+            values.end_item(what);
         }
         Ok(())
     }
 
+    /// Adds the triangles of a polygon.
     #[inline]
-    fn read_face(
-        &self,
-        values: &mut impl Values,
-        index: u64,
-        count: Scalar,
-        item: Scalar,
-        mesh: &mut TriangleMesh,
-    ) -> Result<(), Fault> {
-        let at_face = |values: &_, problem| fault(values, problem, "face", index);
-        let length = values.next(count).map_err(|p| at_face(values, p))?;
-        if length != 3.0 && length != 4.0 {
-            return Err(Fault::new(
-                values.place(),
-                format!("face {index} has {length} vertices"),
-            )
-            .help("split it into triangles or quads"));
-        }
-        let mut corners = [0; 4];
-        for corner in corners.iter_mut().take(length as usize) {
-            let vertex = values.next(item).map_err(|p| at_face(values, p))?;
-            // The cast saturates, so negative numbers, NaN and fractions differ from their result.
-            *corner = vertex as u32;
-            if f64::from(*corner) != vertex || u64::from(*corner) >= self.vertex_count {
-                return Err(self.bad_index(values, index, vertex));
-            }
-        }
-        let [a, b, c, d] = corners;
+    fn face(&mut self, mesh: &mut TriangleMesh) {
+        let (&[a, b, c, ref rest @ ..], first) = (&self.corners[..], mesh.indices.len()) else {
+            self.flat += 1;
+            return;
+        };
         mesh.indices.push([a, b, c]);
-        if length == 4.0 {
-            mesh.indices.push([a, c, d]);
+        let mut last = c;
+        for &corner in rest {
+            mesh.indices.push([a, last, corner]);
+            last = corner;
         }
-        Ok(())
+        match rest.len() + 1 {
+            1 => {}
+            count if mesh.positions.len() as u64 == self.vertex_count => split(mesh, first, count),
+            count => self.unsplit.push((first as u32, count as u32)),
+        }
+    }
+
+    /// Adds the triangles of a strip, every other one with two corners exchanged, so that all face to one side.
+    fn strip(&mut self, mesh: &mut TriangleMesh) {
+        for (index, corners) in self.corners.windows(3).enumerate() {
+            let [a, b, c] = [corners[0], corners[1], corners[2]];
+            mesh.indices
+                .push(if index % 2 == 0 { [a, b, c] } else { [b, a, c] });
+        }
+        self.corners.clear();
     }
 
     #[cold]
-    fn bad_index(&self, values: &impl Values, face: u64, vertex: f64) -> Fault {
+    fn too_many(&self, values: &impl Values) -> Fault {
+        let most = self.most_triangles;
+        Fault::new(
+            values.place(),
+            format!("the mesh has more triangles than the {most} for which memory is allowed"),
+        )
+    }
+
+    #[cold]
+    fn bad_index(&self, values: &impl Values, what: &str, index: u64, vertex: f64) -> Fault {
         let count = self.vertex_count;
         Fault::new(
             values.place(),
-            format!("face {face}: vertex index {vertex} is not one of the {count} vertices"),
+            format!("{what} {index}: vertex index {vertex} is not one of the {count} vertices"),
         )
         .help(format!("indices are 0 to {}", count - 1))
     }
@@ -394,6 +459,10 @@ struct Ascii<'a> {
     /// Range of the last word read.
     word: std::ops::Range<usize>,
     line: u64,
+    /// Number of words of the current item.
+    words: u64,
+    /// First line on which something follows an item, with the words on it, the words of the item, and its name.
+    crowded: Option<(u64, u64, u64, &'static str)>,
 }
 
 impl Ascii<'_> {
@@ -412,10 +481,29 @@ impl Ascii<'_> {
         let length = length.unwrap_or(rest.len());
         self.word = self.at..self.at + length;
         self.at += length;
+        self.words += 1;
         if length == 0 {
             return Err(Problem::End);
         }
         Ok(())
+    }
+
+    /// The mesh, unless a line has more values than its item and the values do not end with the file. Then items are cut
+    /// at the wrong places. A file that has all its values on one line is as good as others.
+    fn judge(
+        mut self,
+        read: Result<(TriangleMesh, u64), Fault>,
+    ) -> Result<(TriangleMesh, u64), Fault> {
+        let Some((line, found, declared, what)) = self.crowded else {
+            return read;
+        };
+        if read.is_ok() && self.next_word().is_err() {
+            return read;
+        }
+        let message = format!(
+            "the line has {found} values, but the header declares {declared} for this {what}"
+        );
+        Err(Fault::new(PlyPlace::Line(line), message))
     }
 }
 
@@ -439,6 +527,24 @@ impl Values for Ascii<'_> {
 
     fn remaining(&self) -> u64 {
         (self.bytes.len() - self.at) as u64
+    }
+
+    fn end_item(&mut self, what: &'static str) {
+        let declared = std::mem::take(&mut self.words);
+        if self.crowded.is_none() {
+            let is_end = |byte: &u8| matches!(byte, b'\n' | b'\r');
+            let line = self.bytes[self.at..]
+                .split(is_end)
+                .next()
+                .unwrap_or_default();
+            let more = line
+                .split(u8::is_ascii_whitespace)
+                .filter(|word| !word.is_empty());
+            let more = more.count() as u64;
+            if more > 0 {
+                self.crowded = Some((self.line, declared + more, declared, what));
+            }
+        }
     }
 }
 

@@ -3,6 +3,9 @@
 use super::{Fault, PlyPlace};
 use crate::params::shorten;
 
+/// Bytes of a triangle.
+const PER_TRIANGLE: u64 = 4 * 3;
+
 /// Format of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
@@ -99,10 +102,12 @@ impl Element {
     }
 }
 
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Debug, PartialEq, Eq)]
 pub(super) struct Header {
     pub format: Format,
     pub elements: Vec<Element>,
+    /// The first line that is not read. Some writers forget that a line is a comment.
+    pub unknown: Option<Fault>,
     /// Offset of the first byte after the header.
     pub body: usize,
     /// Line number of the first line after the header.
@@ -111,15 +116,16 @@ pub(super) struct Header {
 
 impl Header {
     /// Checks that the mesh takes at most so many bytes: positions, normals, texture coordinates, and two triangles of
-    /// every face.
-    pub fn check_memory(&self, max_bytes: u64) -> Result<(), Fault> {
+    /// every face. Returns how many triangles these bytes hold.
+    pub fn check_memory(&self, max_bytes: u64) -> Result<u64, Fault> {
         let of = |name: &str, each: u64| {
             let element = self.element(name);
             element.map_or(0, |element| element.count.saturating_mul(each))
         };
-        let needed = of("vertex", 4 * 8).saturating_add(of("face", 2 * 4 * 3));
+        let vertices = of("vertex", 4 * 8);
+        let needed = vertices.saturating_add(of("face", 2 * PER_TRIANGLE));
         if needed <= max_bytes {
-            return Ok(());
+            return Ok((max_bytes - vertices) / PER_TRIANGLE);
         }
         let message = format!(
             "the mesh needs {needed} bytes of memory, more than the {max_bytes} bytes that are allowed"
@@ -150,7 +156,7 @@ impl<'a> Lines<'a> {
         };
         Self {
             bytes,
-            at: 0,
+            at: bytes.len() - antumbra_scene::without_mark(bytes).len(),
             line: 0,
             end,
         }
@@ -171,7 +177,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, Fault> {
         return Err(Fault::new(PlyPlace::Line(1), "the file is not a PLY file")
             .help("a PLY file begins with a line that says ply"));
     }
-    let mut format = None;
+    let (mut format, mut unknown) = (None, None);
     let mut elements: Vec<Element> = Vec::new();
     loop {
         let Some(line) = lines.next() else {
@@ -210,8 +216,10 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, Fault> {
             }
             _ => {
                 let message = format!("unknown header line: {}", shorten(&line));
-                return Err(Fault::new(place, message)
-                    .help("known: format, element, property, comment, obj_info, end_header"));
+                unknown.get_or_insert_with(|| {
+                    let help = "known: format, element, property, comment, obj_info, end_header";
+                    Fault::new(place, message).help(help)
+                });
             }
         }
     }
@@ -222,6 +230,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, Fault> {
     Ok(Header {
         format,
         elements,
+        unknown,
         body: lines.at,
         body_line: lines.line + 1,
     })

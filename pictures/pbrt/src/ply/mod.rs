@@ -1,7 +1,7 @@
 //! PLY meshes: ASCII and binary in either byte order.
 //!
 //! The `vertex` element gives positions, and normals and texture coordinates if all their components exist. The `face`
-//! element gives triangles and quads. Other elements and properties are ignored. Declared counts are compared with
+//! element gives polygons, and `tristrips` strips of triangles, which -1 ends. Other elements and properties are ignored. Declared counts are compared with
 //! the size of the file before anything is allocated.
 //!
 //! - `header`: format, elements and properties
@@ -57,7 +57,7 @@ impl std::error::Error for PlyError {}
 
 impl PlyError {
     /// Place and message without the path.
-    pub(crate) fn located(&self) -> String {
+    pub fn located(&self) -> String {
         match self.place {
             PlyPlace::Line(line) => format!("line {line}: {}", self.message),
             PlyPlace::Byte(byte) => format!("byte {byte}: {}", self.message),
@@ -82,6 +82,15 @@ impl Fault {
         }
     }
 
+    fn of(self, path: &Path) -> PlyError {
+        PlyError {
+            path: path.to_path_buf(),
+            place: self.place,
+            message: self.message,
+            help: self.help,
+        }
+    }
+
     fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
@@ -90,13 +99,14 @@ impl Fault {
 
 /// Reads a PLY file as a mesh in object space.
 ///
-/// Quads become the triangles `0 1 2` and `0 2 3`, as in pbrt-v3. Normals are scaled to unit length, except zero
-/// vectors. Positions may be NaN or infinite.
+/// Quads become the triangles `0 1 2` and `0 2 3`, as in pbrt-v3, and other polygons fans as well, unless they have inward
+/// corners ([`antumbra_scene::polygon`]). Faces of fewer than three corners are left out. Normals are scaled to unit length,
+/// except zero vectors. Positions may be NaN or infinite.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be read, is larger than 16 GiB, or is not a regular file. [`Error::Ply`] for a
-/// broken header, counts larger than the file, missing positions or faces, polygons of more than four or fewer than
-/// three corners, and vertex indices out of range.
+/// broken header, counts larger than the file, missing positions or faces, lines of more values than the header declares,
+/// and vertex indices out of range.
 pub fn load_ply(path: &Path) -> Result<TriangleMesh, Error> {
     load_ply_within(path, u64::MAX)
 }
@@ -115,14 +125,14 @@ pub(crate) fn load_ply_from(
     max_bytes: u64,
     origin: DVec3,
 ) -> Result<TriangleMesh, Error> {
-    load(path, max_bytes, false, origin)
+    Ok(load(path, max_bytes, false, origin)?.0)
 }
 
 /// Reads a PLY file as [`load_ply_within`], and the colours of its vertices if there are any. Positions are measured from
 /// `origin`, and rounded after that.
 ///
 /// The properties are `red`, `green` and `blue`, or `r`, `g` and `b`. Bytes and 16-bit numbers are decoded from sRGB.
-/// Floats are taken as linear.
+/// Floats are taken as linear. A line of the header that is not known is a warning.
 ///
 /// # Errors
 /// As [`load_ply_within`].
@@ -130,14 +140,35 @@ pub fn load_colored_ply_within(
     path: &Path,
     max_bytes: u64,
     origin: DVec3,
-) -> Result<TriangleMesh, Error> {
-    load(path, max_bytes, true, origin)
+) -> Result<ColoredPly, Error> {
+    let (mesh, flat, unknown) = load(path, max_bytes, true, origin)?;
+    let note = || format!("{flat} faces of fewer than three corners are left out");
+    Ok(ColoredPly {
+        mesh,
+        note: (flat > 0).then(note),
+        warning: unknown.map(|fault| fault.of(path)),
+    })
 }
 
-fn load(path: &Path, max_bytes: u64, colors: bool, origin: DVec3) -> Result<TriangleMesh, Error> {
+/// A PLY file that [`load_colored_ply_within`] reads.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ColoredPly {
+    /// The mesh, with colours if there are any.
+    pub mesh: TriangleMesh,
+    /// How many faces are left out, because they have fewer than three corners.
+    pub note: Option<String>,
+    /// What is wrong with the file, although its mesh is whole.
+    pub warning: Option<PlyError>,
+}
+
+/// Mesh, the number of faces of fewer than three corners, and a line of the header that is not known.
+type Counted = (TriangleMesh, u64, Option<Fault>);
+
+fn load(path: &Path, max_bytes: u64, colors: bool, origin: DVec3) -> Result<Counted, Error> {
     const LIMIT: u64 = 1 << 34;
     // Of other files the first bytes are enough for the error.
-    let starts = |bytes: &[u8]| bytes.starts_with(b"ply");
+    let starts = |bytes: &[u8]| antumbra_scene::without_mark(bytes).starts_with(b"ply");
     let limit = LIMIT.min(max_bytes);
     let bytes = read_regular_file_that(path, limit, starts).map_err(|source| Error::Io {
         path: path.to_path_buf(),
@@ -157,7 +188,7 @@ fn load(path: &Path, max_bytes: u64, colors: bool, origin: DVec3) -> Result<Tria
 /// # Errors
 /// [`Error::Ply`], as for [`load_ply`].
 pub fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Error> {
-    parse_within(bytes, path, u64::MAX, false, DVec3::ZERO)
+    Ok(parse_within(bytes, path, u64::MAX, false, DVec3::ZERO)?.0)
 }
 
 fn parse_within(
@@ -166,20 +197,14 @@ fn parse_within(
     max_bytes: u64,
     colors: bool,
     origin: DVec3,
-) -> Result<TriangleMesh, Error> {
-    mesh_within(bytes, max_bytes, colors, origin).map_err(|fault| {
-        Error::Ply(PlyError {
-            path: path.to_path_buf(),
-            place: fault.place,
-            message: fault.message,
-            help: fault.help,
-        })
-    })
+) -> Result<Counted, Error> {
+    let read = mesh_within(bytes, max_bytes, colors, origin);
+    read.map_err(|fault| Error::Ply(fault.of(path)))
 }
 
 #[cfg(test)]
 fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
-    mesh_within(bytes, u64::MAX, true, DVec3::ZERO)
+    Ok(mesh_within(bytes, u64::MAX, true, DVec3::ZERO)?.0)
 }
 
 fn mesh_within(
@@ -187,10 +212,16 @@ fn mesh_within(
     max_bytes: u64,
     colors: bool,
     origin: DVec3,
-) -> Result<TriangleMesh, Fault> {
-    let header = header::parse(bytes)?;
-    header.check_memory(max_bytes)?;
-    body::parse(bytes, &header, colors, origin)
+) -> Result<Counted, Fault> {
+    let mut header = header::parse(bytes)?;
+    let unknown = header.unknown.take();
+    let most_triangles = header.check_memory(max_bytes)?;
+    let (mesh, flat) = body::parse(bytes, &header, most_triangles, colors, origin)?;
+    match unknown {
+        // Scenes of pbrt are as strict as pbrt.
+        Some(fault) if !colors => Err(fault),
+        unknown => Ok((mesh, flat, unknown)),
+    }
 }
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! Tests of the PLY reader on bytes in memory.
 
-use super::{PlyPlace, parse};
+use glam::DVec3;
+
+use super::{PlyPlace, mesh_within, parse};
 
 fn bytes_of(lines: &str) -> Vec<u8> {
     lines.trim_start().as_bytes().to_vec()
@@ -189,8 +191,8 @@ fn what_is_wrong_is_said_with_its_place() {
         ),
         (
             with("element face 1", "elephant face 1", ""),
-            7,
-            "unknown header line",
+            9,
+            "declares no element face",
         ),
         (
             with("", "", "3 0 1 2\n"),
@@ -199,7 +201,16 @@ fn what_is_wrong_is_said_with_its_place() {
         ),
         (with("", "", "\n3 0 1 -1\n"), 13, "vertex index -1"),
         (with("", "", "3 0 1 0.5\n"), 12, "vertex index 0.5"),
-        (with("", "", "5 0 1 0 1 0\n"), 12, "face 0 has 5 vertices"),
+        (
+            with("", "", "3 0 1 0 7\n"),
+            12,
+            "the line has 5 values, but the header declares 4 for this face",
+        ),
+        (
+            with("0 0 0\n0 0 0\n", "0 0 0 9\n0 0 0 9\n", "3 0 1 0\n"),
+            10,
+            "the line has 4 values, but the header declares 3 for this vertex",
+        ),
         (
             with("", "", "3 0 1 x\n"),
             12,
@@ -230,4 +241,85 @@ fn elements_without_properties_and_lone_carriage_returns_are_fine() {
         property float x\rproperty float y\rproperty float z\relement face 1\r\
         property list uchar int vertex_indices\rend_header\r1 2 3\r3 0 0 0\r";
     assert_eq!(parse(text.as_bytes()).unwrap().positions, [[1.0, 2.0, 3.0]]);
+}
+
+/// A file of these vertices in the plane z = 0, and these other elements.
+fn flat(vertices: &[[i32; 2]], elements: &str, body: &str) -> String {
+    let rows: String = vertices
+        .iter()
+        .map(|[x, y]| format!("{x} {y} 0\n"))
+        .collect();
+    let list = "property list uchar int vertex_indices";
+    let count = vertices.len();
+    let elements = elements.replace("LIST", list);
+    format!(
+        "\u{feff}ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\nproperty float y\n\
+         property float z\n{elements}\nend_header\n{rows}{body}"
+    )
+}
+
+#[test]
+fn polygons_are_split_and_lesser_faces_counted() {
+    let arrow = [[0, 2], [1, 1], [0, 0], [2, 1]];
+    let text = flat(
+        &arrow,
+        "element face 5\nLIST",
+        "4 0 1 2 3\n0\n1 2\n2 0 1\n3 0 1 3\n",
+    );
+    let (mesh, count, unknown) = mesh_within(text.as_bytes(), u64::MAX, true, DVec3::ZERO).unwrap();
+    assert_eq!((mesh.indices.len(), count, unknown), (3, 3, None));
+    // A comment that does not say so.
+    let odd = text.replace("format ascii 1.0", "format ascii 1.0\nmade by hand");
+    let within = |colors| mesh_within(odd.as_bytes(), u64::MAX, colors, DVec3::ZERO);
+    let (same, _, unknown) = within(true).unwrap();
+    let unknown = unknown.unwrap();
+    assert_eq!(same, mesh);
+    assert_eq!(
+        (unknown.place, &*unknown.message),
+        (PlyPlace::Line(3), "unknown header line: made by hand")
+    );
+    assert_eq!(within(false), Err(unknown));
+    // The edge between the triangles begins at the inward corner 1.
+    for corners in &mesh.indices[..2] {
+        assert!(corners.contains(&1) && corners.contains(&3), "{corners:?}");
+    }
+    // Faces before vertices, and a hexagon.
+    let text = "ply\nformat ascii 1.0\nelement face 2\nproperty list uchar int vertex_index\nelement vertex 6\n\
+        property float x\nproperty float y\nproperty float z\nend_header\n6 0 1 2 3 4 5\n4 5 2 1 3\n\
+        0 0 0\n2 0 0\n3 1 0\n2 2 0\n0 2 0\n-1 1 0\n";
+    let mesh = parse(text.as_bytes()).unwrap();
+    assert_eq!(
+        mesh.indices[..4],
+        [[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]]
+    );
+    assert_eq!(mesh.indices.len(), 6);
+}
+
+#[test]
+fn strips_turn_every_other_triangle_and_end_at_minus_one() {
+    let square = [[0, 0], [1, 0], [0, 1], [1, 1]];
+    let text = flat(
+        &square,
+        "element tristrips 2\nLIST",
+        "9 0 1 2 3 -1 3 2 1 -1\n2 0 1\n",
+    );
+    let mesh = parse(text.as_bytes()).unwrap();
+    assert_eq!(mesh.indices, [[0, 1, 2], [2, 1, 3], [3, 2, 1]]);
+    let both = flat(
+        &square,
+        "element face 0\nLIST\nelement tristrips 1\nLIST",
+        "3 0 1 2\n",
+    );
+    assert_eq!(parse(both.as_bytes()).unwrap().indices.len(), 1);
+    // Two triangles take 24 bytes beside four vertices.
+    let text = flat(&square, "element tristrips 1\nLIST", "4 0 1 2 3\n");
+    let within = |bytes| mesh_within(text.as_bytes(), bytes, false, DVec3::ZERO);
+    assert!(within(4 * 32 + 24).is_ok());
+    let fault = within(4 * 32 + 12).unwrap_err();
+    assert!(
+        fault.message.contains("more triangles than the 1"),
+        "{fault:?}"
+    );
+    let bad = flat(&square, "element face 1\nLIST", "3 0 1 -1\n");
+    assert!(parse(bad.as_bytes()).is_err());
 }
