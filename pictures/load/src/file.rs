@@ -214,7 +214,7 @@ fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> 
         }
         "stl" => plain_mesh(path, load_stl(path, limit, origin)?),
         "obj" => of_model(path, load_obj(path, limit, origin, options.looks)?),
-        "gltf" | "glb" => of_model(path, load_gltf(path, limit, origin)?),
+        "gltf" | "glb" => of_model(path, load_gltf(path, limit, origin, options.looks)?),
         "tif" | "tiff" | "asc" | "npy" => terrain::load(path, stem(path), limit, origin)?,
         _ if path.is_dir() => {
             return Err(Error::Folder {

@@ -43,7 +43,8 @@ pub(super) struct Look {
 /// Looks made so far.
 pub(super) struct Looks<'a> {
     buffers: &'a [Cow<'a, [u8]>],
-    folder: &'a Path,
+    /// Folder of the images; `None` if they are not wanted.
+    folder: Option<&'a Path>,
     images: Images,
     materials: Vec<Material>,
     known: HashMap<(Option<usize>, bool), Look>,
@@ -123,7 +124,7 @@ impl Coordinates {
 }
 
 impl<'a> Looks<'a> {
-    pub fn new(buffers: &'a [Cow<'a, [u8]>], folder: &'a Path, images: Images) -> Self {
+    pub fn new(buffers: &'a [Cow<'a, [u8]>], folder: Option<&'a Path>, images: Images) -> Self {
         Self {
             buffers,
             folder,
@@ -409,6 +410,7 @@ impl Surface<'_, '_> {
         coordinates: Coordinates,
         channel: Channel,
     ) -> Option<(Loaded, Laid)> {
+        let folder = self.looks.folder?;
         let set = *self.uv_set.get_or_insert(coordinates.set);
         if set != coordinates.set {
             self.looks.note(
@@ -436,7 +438,7 @@ impl Surface<'_, '_> {
             mapping: coordinates.mapping(),
             wrap,
         };
-        match self.image(&image, channel) {
+        match self.image(&image, channel, folder) {
             Ok(loaded) => Some((loaded, laid)),
             Err(unread) => {
                 let (place, index) = (&self.place, image.index());
@@ -453,7 +455,12 @@ impl Surface<'_, '_> {
         }
     }
 
-    fn image(&mut self, image: &gltf::Image, channel: Channel) -> Result<Loaded, Unread> {
+    fn image(
+        &mut self,
+        image: &gltf::Image,
+        channel: Channel,
+        folder: &Path,
+    ) -> Result<Loaded, Unread> {
         let name = format!("image {}", image.index());
         match image.source() {
             Source::View { view, .. } => {
@@ -469,7 +476,7 @@ impl Surface<'_, '_> {
                     self.looks.images.bytes(&bytes, &name, channel)
                 }
                 Err(_) => {
-                    let (path, name) = file_of(uri, self.looks.folder)?;
+                    let (path, name) = file_of(uri, folder)?;
                     let read = self.looks.images.file(&path, channel);
                     read.map_err(|unread| unread.of(&name))
                 }

@@ -1,18 +1,24 @@
 //! glTF 2.0 (`.gltf` and `.glb`): geometry, metallic-roughness materials, cameras and lights, read by the crate `gltf`.
 //!
-//! Meshes of several nodes become objects with instances, unless they emit light. Skins and morph targets are shown at
-//! rest. What is left out is named in the model's notes. Unsupported ways to define surfaces, such as compression and
-//! sparse accessors, are errors.
+//! Meshes of several nodes become objects with instances, unless they emit light. Skins and morph targets become plain
+//! meshes at rest. What is left out and changes only looks is named in the model's notes. Compressed meshes are errors.
+//! Only what the shown scene needs is checked.
 //!
 //! Version 1.4.1 of the crate panics on a few broken files. Some numbers are therefore checked first, where comments
 //! say so. Buffers are opened here, because the crate would add image decoders as dependencies.
 //!
-//! - `reader.rs`: nodes, meshes and their accessors
+//! - `needs.rs`: what the shown scene refers to
+//! - `reader.rs`: nodes, meshes and instances
+//! - `accessors.rs`: numbers in buffers
+//! - `pose.rs`: morph targets and skins
 //! - `looks.rs`: materials and textures
 //! - `places.rs`: cameras and lights
 
+mod accessors;
 mod looks;
+mod needs;
 mod places;
+mod pose;
 mod reader;
 
 use std::borrow::Cow;
@@ -20,30 +26,42 @@ use std::path::{Path, PathBuf};
 
 use ::gltf::buffer::Source;
 use ::gltf::json::validation::{self, Checked, Validate};
-use ::gltf::{Buffer, Document, Gltf, Semantic, json};
+use ::gltf::json::{Root, Value};
+use ::gltf::{Buffer, Document, Glb, Semantic, json};
 use data_url::{DataUrl, DataUrlError};
 use glam::DVec3;
 use percent_encoding::percent_decode_str;
 
 use crate::{Error, Model, broken, file};
+use needs::Needs;
 use reader::Reader;
 
 /// Extensions that are read.
 const SUPPORTED_EXTENSIONS: &[&str] = &[
+    "EXT_mesh_gpu_instancing",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_node_visibility",
     "KHR_texture_transform",
 ];
+/// Extension of meshes that are compressed.
+const DRACO: &str = "KHR_draco_mesh_compression";
+/// Extensions of compression. Files may have the same meshes without it as well, if they do not require them.
+const COMPRESSIONS: &[&str] = &[DRACO, "EXT_meshopt_compression", "KHR_meshopt_compression"];
+/// Extensions that move what they are left out of.
+const MOVING_EXTENSIONS: &[&str] = &["CESIUM_RTC"];
 /// Prefixes of extensions that change the look of surfaces, not their geometry. Others are left out with a note.
 const APPEARANCE_EXTENSIONS: &[&str] = &[
     "KHR_materials_",
     "KHR_texture_",
     "EXT_texture_",
     "KHR_lights_",
+    "KHR_technique",
 ];
 
 /// Reads the scene of a glTF file.
@@ -54,10 +72,11 @@ const APPEARANCE_EXTENSIONS: &[&str] = &[
 /// use one buffer or mesh any number of times. Files that the glTF file names are looked up in its folder.
 ///
 /// # Errors
-/// [`Error::Io`], or [`Error::Broken`] with the first mistakes. Missing images are [warnings](Model::warnings).
-pub fn load_gltf(path: &Path, max_bytes: u64, origin: DVec3) -> Result<Model, Error> {
+/// [`Error::Io`], or [`Error::Broken`] with the first mistakes. Missing images are [warnings](Model::warnings). Without
+/// `looks`, no image is read, and nothing is said of materials.
+pub fn load_gltf(path: &Path, max_bytes: u64, origin: DVec3, looks: bool) -> Result<Model, Error> {
     let bytes = file::read(path, max_bytes, is_gltf).map_err(Error::io(path))?;
-    parse_from(&bytes, path, max_bytes, origin)
+    parse_from(&bytes, path, max_bytes, origin, looks)
 }
 
 /// A file that is neither JSON nor a GLB is refused before it is read.
@@ -70,11 +89,11 @@ fn is_gltf(start: &[u8]) -> Result<(), String> {
 
 /// Bytes that a JSON object and a JSON value take at most when they are read, beside the text.
 const PER_OBJECT: u64 = 320;
-const PER_VALUE: u64 = 16;
+const PER_VALUE: u64 = 32;
 /// Bytes that the JSON may always take.
 const ALWAYS: u64 = 1 << 20;
 
-/// Checks the memory that the JSON of a file needs, which is far more than its text: an empty node has two bytes.
+/// Contents the memory that the JSON of a file needs, which is far more than its text: an empty node has two bytes.
 ///
 /// Brackets and commas in strings count, too, as do such bytes in the binary data of a GLB up to the JSON's length.
 fn check_json(bytes: &[u8], max_bytes: u64) -> Result<(), Vec<String>> {
@@ -102,13 +121,19 @@ fn check_json(bytes: &[u8], max_bytes: u64) -> Result<(), Vec<String>> {
 /// # Errors
 /// [`Error::Broken`], as for [`load_gltf`].
 pub fn parse_gltf(bytes: &[u8], path: &Path, max_bytes: u64) -> Result<Model, Error> {
-    parse_from(bytes, path, max_bytes, DVec3::ZERO)
+    parse_from(bytes, path, max_bytes, DVec3::ZERO, true)
 }
 
 /// Reads a model that is measured from `origin`.
-fn parse_from(bytes: &[u8], path: &Path, max_bytes: u64, origin: DVec3) -> Result<Model, Error> {
+fn parse_from(
+    bytes: &[u8],
+    path: &Path,
+    max_bytes: u64,
+    origin: DVec3,
+    looks: bool,
+) -> Result<Model, Error> {
     let folder = path.parent().unwrap_or(Path::new(""));
-    let parsed = parse(bytes, folder, max_bytes, origin).map_err(|mistakes| {
+    let parsed = parse(bytes, folder, max_bytes, origin, looks).map_err(|mistakes| {
         let lines = mistakes.iter();
         let lines = lines.map(|mistake| format!("error: {}: {mistake}", path.display()));
         broken(lines.collect())
@@ -121,15 +146,24 @@ fn parse_from(bytes: &[u8], path: &Path, max_bytes: u64, origin: DVec3) -> Resul
 }
 
 /// Reads the model, or lists all mistakes. Warnings are without a place.
-fn parse(bytes: &[u8], folder: &Path, max_bytes: u64, origin: DVec3) -> Result<Model, Vec<String>> {
+fn parse(
+    bytes: &[u8],
+    folder: &Path,
+    max_bytes: u64,
+    origin: DVec3,
+    looks: bool,
+) -> Result<Model, Vec<String>> {
     check_json(bytes, max_bytes)?;
-    let (document, binary) = document(bytes)?;
+    let (document, binary, needs) = document(bytes, looks)?;
     let mut mistakes = Vec::new();
     let mut left = max_bytes;
     let mut files = Vec::new();
     let buffers: Vec<_> = document
         .buffers()
         .map(|buffer| {
+            if !needs.has("buffers", buffer.index()) {
+                return Cow::Borrowed(&[][..]);
+            }
             let binary = binary.as_deref().filter(|_| buffer.index() == 0);
             let found = contents(&buffer, binary, folder, left, &mut files);
             let contents = found.unwrap_or_else(|mistake| {
@@ -143,14 +177,21 @@ fn parse(bytes: &[u8], folder: &Path, max_bytes: u64, origin: DVec3) -> Result<M
     if !mistakes.is_empty() {
         return Err(mistakes);
     }
-    let mut reader = Reader::new(&document, &buffers, folder, max_bytes);
+    let mut reader = Reader::new(&document, &buffers, looks.then_some(folder), max_bytes);
     for name in document.extensions_used() {
-        if !SUPPORTED_EXTENSIONS.contains(&name) {
-            reader.note(format!("extension {name} is not supported and is left out"));
+        let text = format!("extension {name} is not supported and is left out");
+        match name {
+            // What is compressed is also there without compression, or else an error.
+            name if SUPPORTED_EXTENSIONS.contains(&name) || COMPRESSIONS.contains(&name) => {}
+            name if MOVING_EXTENSIONS.contains(&name) => {
+                reader.warn(format!("{text}: the model may be in another place"));
+            }
+            name if changes_looks(name) => reader.look_note(&text),
+            _ => reader.note(text),
         }
     }
-    if document.animations().len() > 0 || document.skins().len() > 0 {
-        reader.note("animations and skins are left out: everything is shown at rest");
+    if !document.as_json().animations.is_empty() {
+        reader.note("animations are left out: everything is shown at rest");
     }
     let mut model = reader.read(origin)?;
     model.files.extend(files);
@@ -167,47 +208,90 @@ fn file_of(uri: &str, folder: &Path) -> Result<(PathBuf, String), String> {
     Ok((folder.join(&*name), name.into_owned()))
 }
 
-/// Whether a GLB has fewer bytes than it states.
-fn is_short(bytes: &[u8], stated: [u8; 4]) -> bool {
-    (bytes.len() as u64) < u64::from(u32::from_le_bytes(stated))
+/// Whether an extension changes the looks of surfaces, and not their geometry.
+fn changes_looks(name: &str) -> bool {
+    let mut prefixes = APPEARANCE_EXTENSIONS.iter();
+    prefixes.any(|start| name.starts_with(start))
 }
 
-/// Reads the JSON of a file, with all references checked, and its binary chunk.
-fn document(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>), Vec<String>> {
+/// Why a compressed file is refused.
+fn compressed(extension: &str) -> String {
+    format!(
+        "the meshes are compressed by {extension}, which is not read; \
+         `gltf-transform copy IN.glb OUT.glb` writes them without"
+    )
+}
+
+/// Why a file of another version is refused.
+fn of_version(version: &str) -> Vec<String> {
+    let help = match version.starts_with("1.") {
+        true => "; `gltf-pipeline -i IN.gltf -o OUT.gltf` makes version 2 of version 1",
+        false => "",
+    };
+    vec![format!(
+        "glTF version `{version}`, where version 2 is supported{help}"
+    )]
+}
+
+/// A document, its binary chunk, and what the shown scene needs.
+type Contents = (Document, Option<Vec<u8>>, Needs);
+
+/// Reads the JSON of a file, with all references checked that the shown scene needs, and its binary chunk.
+fn document(bytes: &[u8], looks: bool) -> Result<Contents, Vec<String>> {
     // The crate subtracts the size of the header from the stated length without a check.
     if bytes.is_empty() {
         return Err(vec!["the file is empty".to_owned()]);
     }
-    let stated = bytes.get(8..).and_then(<[u8]>::first_chunk::<4>);
-    if bytes.starts_with(b"glTF") && stated.is_none_or(|&length| u32::from_le_bytes(length) < 12) {
+    let is_glb = bytes.starts_with(b"glTF");
+    let number = |place: usize| {
+        let bytes = bytes.get(place..).and_then(<[u8]>::first_chunk::<4>);
+        bytes.map(|&bytes| u32::from_le_bytes(bytes))
+    };
+    if is_glb && number(8).is_none_or(|length| length < 12) {
         return Err(vec!["the GLB is shorter than its header".to_owned()]);
     }
-    let Gltf { document, blob } =
-        Gltf::from_slice_without_validation(bytes).map_err(|error| match error {
-            ::gltf::Error::Deserialize(error) => vec![format!("JSON: {error}")],
-            ::gltf::Error::Binary(_) if stated.is_some_and(|&length| is_short(bytes, length)) => {
-                let (is, length) = (
-                    bytes.len(),
-                    stated.map(|&length| u32::from_le_bytes(length)),
-                );
-                let length = length.unwrap_or_default();
-                vec![format!(
-                    "the file ends early: {is} of {length} bytes are there"
-                )]
-            }
-            ::gltf::Error::Binary(error) => vec![format!("GLB: {error}")],
-            error => vec![error.to_string()],
-        })?;
-
-    let mut json = document.into_json();
-    let mut mistakes = Vec::new();
-    let version = &json.asset.version;
-    if !version.starts_with("2.") {
-        mistakes.push(format!("glTF version `{version}`; version 2 is supported"));
+    if is_glb && number(4) == Some(1) {
+        return Err(of_version("1.0"));
     }
+    let (text, binary) = match is_glb {
+        true => match Glb::from_slice(bytes) {
+            Ok(glb) => (glb.json, glb.bin.map(Cow::into_owned)),
+            Err(error) => {
+                let (is, stated) = (bytes.len() as u64, number(8).unwrap_or_default());
+                return Err(vec![match error {
+                    _ if is < stated.into() => {
+                        format!("the file ends early: {is} of {stated} bytes are there")
+                    }
+                    ::gltf::Error::Binary(error) => format!("GLB: {error}"),
+                    error => error.to_string(),
+                }]);
+            }
+        },
+        false => (Cow::Borrowed(bytes), None),
+    };
+    let mut json = root(antumbra_scene::without_mark(&text))?;
+    let required = std::mem::take(&mut json.extensions_required);
+    if let Some(name) = required
+        .iter()
+        .find(|name| COMPRESSIONS.contains(&&***name))
+    {
+        return Err(vec![compressed(name)]);
+    }
+    let mut mistakes = Vec::new();
+    for name in required {
+        if !SUPPORTED_EXTENSIONS.contains(&&*name) && !changes_looks(&name) {
+            mistakes.push(format!(
+                "the file requires the extension {name}, which is not supported"
+            ));
+        }
+    }
+    let needs = Needs::of(&json, looks);
     // The crate looks up the accessor of positions during validation, without a check of its index.
     let accessors = json.accessors.len();
-    for (index, mesh) in json.meshes.iter().enumerate() {
+    for (index, mesh) in json.meshes.iter_mut().enumerate() {
+        if !needs.has("meshes", index) {
+            mesh.primitives.clear();
+        }
         for (place, primitive) in mesh.primitives.iter().enumerate() {
             let positions = &Checked::Valid(Semantic::Positions);
             let position = primitive.attributes.get(positions);
@@ -222,25 +306,57 @@ fn document(bytes: &[u8]) -> Result<(Document, Option<Vec<u8>>), Vec<String>> {
     if !mistakes.is_empty() {
         return Err(mistakes);
     }
-    let harmful = |name: &String| {
-        !APPEARANCE_EXTENSIONS
-            .iter()
-            .any(|start| name.starts_with(start))
-    };
-    json.extensions_required.retain(harmful);
     json.validate(&json, json::Path::new, &mut |path, error| {
         let path = path();
-        // Bounds are required by the specification, but some writers omit them, and nothing here needs them.
-        let bound = [".min", ".max"].iter().any(|end| path.0.ends_with(end));
-        if !(bound && error == validation::Error::Missing) {
+        // Nothing here needs bounds, which some writers omit. Primitives without positions are left out, and accessors without
+        // a view are zero.
+        let may_lack = ["min", "max", "[\"POSITION\"]", "bufferView"];
+        let may_lack = may_lack.iter().any(|end| path.0.ends_with(end));
+        let is_lack = may_lack && error == validation::Error::Missing;
+        // Attributes with names of their own are not read.
+        let is_own = path.0.ends_with("<invalid semantic name>\"]");
+        if !is_lack && !is_own && needs.has_path(&path.0) && !path.0.starts_with("animations[") {
             mistakes.push(format!("{path}: {error}"));
         }
     });
-    if mistakes.is_empty() {
-        Ok((Document::from_json_without_validation(json), blob))
-    } else {
-        Err(mistakes)
+    match mistakes.is_empty() {
+        true => Ok((Document::from_json_without_validation(json), binary, needs)),
+        false => Err(mistakes),
     }
+}
+
+/// The JSON of a file. Scenes without nodes are valid, but not for the crate.
+fn root(text: &[u8]) -> Result<Root, Vec<String>> {
+    let error = match json::deserialize::from_slice::<Root>(text) {
+        Ok(root) => match &root.asset.version {
+            version if version.starts_with("2.") => return Ok(root),
+            version => return Err(of_version(version)),
+        },
+        Err(error) => vec![format!("JSON: {error}")],
+    };
+    let mut value: Value = json::deserialize::from_slice(text).map_err(|_| error.clone())?;
+    // Version 1 has objects where version 2 has lists.
+    let version = value
+        .get("asset")
+        .and_then(|asset| asset.get("version"))
+        .cloned();
+    let is_old = value.get("meshes").is_some_and(Value::is_object);
+    match version.as_ref().and_then(Value::as_str) {
+        Some(version) if !version.starts_with("2.") => return Err(of_version(version)),
+        None if is_old => return Err(of_version("1.0")),
+        _ => {}
+    }
+    let scenes = value.get_mut("scenes").and_then(Value::as_array_mut);
+    for scene in scenes
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_object_mut)
+    {
+        scene
+            .entry("nodes")
+            .or_insert_with(|| Value::Array(Vec::new()));
+    }
+    json::deserialize::from_value(value).map_err(|_| error)
 }
 
 /// Bytes of a buffer: the binary chunk, base64 inside the JSON, or a file in the same folder.

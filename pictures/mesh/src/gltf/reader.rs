@@ -6,29 +6,34 @@ use std::path::Path;
 use std::sync::Arc;
 
 use antumbra_scene::{Geometry, Instance, Object, Rgb, Shape, TriangleMesh};
-use glam::{Affine3, DMat4, DVec3, Mat4, Vec2, Vec3};
-use gltf::accessor::{DataType, Dimensions};
+use glam::{Affine3, DMat4, DQuat, DVec3, Vec2, Vec3};
+use gltf::accessor::Dimensions;
 use gltf::mesh::Mode;
 use gltf::{Accessor, Document, Mesh, Node, Primitive, Semantic};
 
+use super::accessors::{self, Numbers};
 use super::looks::{Look, Looks};
-use super::places;
+use super::pose::{self, Pose, Worlds};
+use super::{DRACO, compressed, needs, places};
 use crate::images::Images;
 use crate::{Model, Part, Warning};
 
-const INDEX_TYPES: &[DataType] = &[DataType::U8, DataType::U16, DataType::U32];
-/// Types of fractions of 1. Integers are normalized.
-const FRACTION_TYPES: &[DataType] = &[DataType::U8, DataType::U16, DataType::F32];
+/// Bytes that a place of a mesh takes at most while the file is read.
+const PER_INSTANCE: u64 = 512;
 
 /// State of reading: the model so far, the memory left, and the mistakes.
 pub(super) struct Reader<'a> {
-    document: &'a Document,
+    pub document: &'a Document,
     buffers: &'a [Cow<'a, [u8]>],
     looks: Looks<'a>,
     model: Model,
     /// Memory left for further meshes, in bytes.
     left: u64,
     mistakes: Vec<String>,
+    /// Whether integers may be lengths: by `KHR_mesh_quantization`.
+    is_quantized: bool,
+    /// Whether notes and warnings about materials are wanted.
+    wants_looks: bool,
     /// Whether shapes are kept whose masks cut all away.
     keeps_invisible: bool,
     /// Whether such a shape was left out.
@@ -39,18 +44,21 @@ pub(super) struct Reader<'a> {
 struct Placed<'a> {
     mesh: Mesh<'a>,
     to_world: DMat4,
+    /// Shape of its own, by a skin or by weights of the node.
+    pose: Option<Pose<'a>>,
     /// Name of the node, or else of the mesh.
     name: String,
 }
 
 impl<'a> Reader<'a> {
-    /// Nothing read yet. Meshes and images may take `max_bytes` each.
+    /// Nothing read yet. Meshes and images may take `max_bytes` each. Without a folder, no image is read.
     pub fn new(
         document: &'a Document,
         buffers: &'a [Cow<'a, [u8]>],
-        folder: &'a Path,
+        folder: Option<&'a Path>,
         max_bytes: u64,
     ) -> Self {
+        let mut used = document.extensions_used();
         Self {
             document,
             buffers,
@@ -58,6 +66,8 @@ impl<'a> Reader<'a> {
             model: Model::default(),
             left: max_bytes,
             mistakes: Vec::new(),
+            is_quantized: used.any(|name| name == "KHR_mesh_quantization"),
+            wants_looks: folder.is_some(),
             keeps_invisible: false,
             has_invisible: false,
         }
@@ -66,6 +76,22 @@ impl<'a> Reader<'a> {
     /// Adds a note to the model.
     pub fn note(&mut self, note: impl Into<String>) {
         self.model.note(note);
+    }
+
+    /// Adds a note about materials to the model.
+    pub fn look_note(&mut self, note: &str) {
+        if self.wants_looks {
+            self.model.note(note);
+        }
+    }
+
+    /// Adds a warning to the model.
+    pub fn warn(&mut self, text: String) {
+        let place = String::new();
+        let warning = Warning { place, text };
+        if !self.model.warnings.contains(&warning) {
+            self.model.warnings.push(warning);
+        }
     }
 
     /// Reads the scene, or lists all mistakes. Warnings are without a place.
@@ -83,7 +109,7 @@ impl<'a> Reader<'a> {
         }
         let notes = self.looks.take_notes();
         for note in notes {
-            self.model.note(note);
+            self.look_note(&note);
         }
         let warnings = self.looks.take_warnings().into_iter();
         self.model.warnings.extend(warnings.map(|text| Warning {
@@ -98,7 +124,7 @@ impl<'a> Reader<'a> {
     /// Adds shapes, objects and instances of all meshes.
     fn place(&mut self, placed: &[Placed<'a>]) {
         let mut uses: HashMap<usize, usize> = HashMap::new();
-        for place in placed {
+        for place in placed.iter().filter(|place| place.pose.is_none()) {
             *uses.entry(place.mesh.index()).or_default() += 1;
         }
         // Objects of meshes that stand in several places, if they have shapes.
@@ -106,13 +132,15 @@ impl<'a> Reader<'a> {
         for Placed {
             mesh,
             to_world: matrix,
+            pose,
             name,
         } in placed
         {
             let index = mesh.index();
             let usable = matrix.is_finite() && matrix.determinant() != 0.0;
-            if uses[&index] < 2 || !usable {
-                self.add_shapes((mesh, name), matrix, |_| true);
+            if pose.is_some() || uses[&index] < 2 || !usable {
+                let pose = pose.clone().unwrap_or_default();
+                self.add_shapes((mesh, name, &pose), matrix, |_| true);
                 continue;
             }
             let object = match objects.get(&index) {
@@ -132,7 +160,8 @@ impl<'a> Reader<'a> {
                 });
             }
             // Lights of instances would be dark.
-            self.add_shapes((mesh, name), matrix, |look| look.emission.is_some());
+            let lights = |look: &Look| look.emission.is_some();
+            self.add_shapes((mesh, name, &Pose::default()), matrix, lights);
         }
     }
 
@@ -143,6 +172,8 @@ impl<'a> Reader<'a> {
         let document = self.document;
         let mut placed = Vec::new();
         let mut visited = vec![false; document.nodes().len()];
+        let root = DMat4::from_translation(-origin);
+        let mut worlds = Worlds::new(document, root);
         let scene = document.default_scene().or(document.scenes().next());
         let mut open: Vec<_> = match scene {
             Some(scene) => scene.nodes().collect::<Vec<_>>(),
@@ -150,7 +181,7 @@ impl<'a> Reader<'a> {
         }
         .into_iter()
         .rev()
-        .map(|root| (root, DMat4::from_translation(-origin)))
+        .map(|node| (node, root))
         .collect();
         while let Some((node, to_parent)) = open.pop() {
             let index = node.index();
@@ -160,15 +191,16 @@ impl<'a> Reader<'a> {
                 ));
                 continue;
             }
-            let own = Mat4::from_cols_array_2d(&node.transform().matrix());
-            let to_world = to_parent * own.as_dmat4();
-            if let Some(mesh) = node.mesh() {
-                let name = node.name().or(mesh.name()).unwrap_or_default().to_owned();
-                placed.push(Placed {
-                    mesh,
-                    to_world,
-                    name,
-                });
+            let visible = node.extension_value("KHR_node_visibility");
+            if visible.and_then(|value| value.get("visible")?.as_bool()) == Some(false) {
+                continue;
+            }
+            let to_world = to_parent * pose::own(&node);
+            if let Some(mesh) = node.mesh()
+                && let Err(mistake) =
+                    self.add_places(&node, mesh, to_world, &mut worlds, &mut placed)
+            {
+                self.mistakes.push(format!("node {index}: {mistake}"));
             }
             if let Some(camera) = node.camera() {
                 places::add_camera(&camera, to_world.as_mat4(), &mut self.model);
@@ -182,15 +214,48 @@ impl<'a> Reader<'a> {
         placed
     }
 
+    /// Adds the places of a node's mesh.
+    fn add_places(
+        &mut self,
+        node: &Node<'a>,
+        mesh: Mesh<'a>,
+        to_world: DMat4,
+        worlds: &mut Worlds,
+        placed: &mut Vec<Placed<'a>>,
+    ) -> Result<(), String> {
+        let name = node.name().or(mesh.name()).unwrap_or_default();
+        let joints = match node.skin() {
+            Some(skin) => self.joints(&skin, worlds)?,
+            None => Vec::new(),
+        };
+        let weights = node.weights();
+        let is_own = weights.is_some() || !joints.is_empty();
+        let pose = is_own.then_some(Pose { weights, joints });
+        for to_world in self.places(node, to_world)? {
+            placed.push(Placed {
+                mesh: mesh.clone(),
+                to_world,
+                pose: pose.clone(),
+                name: name.to_owned(),
+            });
+        }
+        Ok(())
+    }
+
     /// Adds the shapes of a mesh whose looks are `wanted`, in world space.
     fn add_shapes(
         &mut self,
-        (mesh, name): (&Mesh, &str),
+        (mesh, name, pose): (&Mesh<'a>, &str, &Pose<'a>),
         to_world: &DMat4,
         wanted: impl Fn(&Look) -> bool,
     ) {
-        for (shape, mut part) in self.shapes(mesh, wanted) {
+        for (shape, mut part, is_placed) in self.shapes(mesh, pose, wanted) {
             part.object = name.to_owned();
+            let to_world = if is_placed {
+                &DMat4::IDENTITY
+            } else {
+                to_world
+            };
             // Only spheres cannot be transformed.
             if let Some(shape) = shape.transformed(to_world) {
                 self.model.shapes.push(shape);
@@ -200,12 +265,13 @@ impl<'a> Reader<'a> {
     }
 
     /// Object of a mesh without its lights. `None` if nothing is left.
-    fn object(&mut self, mesh: &Mesh) -> Option<usize> {
-        let shapes = self.shapes(mesh, |look| look.emission.is_none());
+    fn object(&mut self, mesh: &Mesh<'a>) -> Option<usize> {
+        let shapes = self.shapes(mesh, &Pose::default(), |look| look.emission.is_none());
         if shapes.is_empty() {
             return None;
         }
-        let (shapes, parts): (_, Vec<_>) = shapes.into_iter().unzip();
+        let shapes = shapes.into_iter().map(|(shape, part, _)| (shape, part));
+        let (shapes, parts): (_, Vec<_>) = shapes.unzip();
         let parts = parts.into_iter().map(|part| vec![part]);
         self.model.names.objects.push(parts.collect());
         self.model.objects.push(Object {
@@ -215,8 +281,14 @@ impl<'a> Reader<'a> {
         Some(self.model.objects.len() - 1)
     }
 
-    /// Shapes of a mesh whose looks are `wanted`, in the space of its node, with the names of their materials.
-    fn shapes(&mut self, mesh: &Mesh, wanted: impl Fn(&Look) -> bool) -> Vec<(Shape, Part)> {
+    /// Shapes of a mesh whose looks are `wanted`, in the space of its node or, where that is `true`, in the world, with the
+    /// names of their materials.
+    fn shapes(
+        &mut self,
+        mesh: &Mesh<'a>,
+        pose: &Pose<'a>,
+        wanted: impl Fn(&Look) -> bool,
+    ) -> Vec<(Shape, Part, bool)> {
         let mut shapes = Vec::new();
         for primitive in mesh.primitives() {
             let has_colors = primitive.get(&Semantic::Colors(0)).is_some();
@@ -232,9 +304,10 @@ impl<'a> Reader<'a> {
                 true => Some(0.0.into()),
                 false => look.alpha.clone(),
             };
-            match self.primitive(&primitive, look.uv_set) {
+            let weights = mesh.weights().unwrap_or_default();
+            match self.primitive(&primitive, look.uv_set, pose, weights) {
                 Ok(None) => {}
-                Ok(Some(mesh)) => {
+                Ok(Some((mesh, is_placed))) => {
                     let part = Part {
                         object: String::new(),
                         material: primitive.material().name().unwrap_or_default().to_owned(),
@@ -250,7 +323,7 @@ impl<'a> Reader<'a> {
                         reverse_orientation: false,
                         transform_swaps_handedness: false,
                     };
-                    shapes.push((shape, part));
+                    shapes.push((shape, part, is_placed));
                 }
                 Err(mistake) => {
                     let (mesh, place) = (mesh.index(), primitive.index());
@@ -262,14 +335,17 @@ impl<'a> Reader<'a> {
         shapes
     }
 
-    /// Mesh of a primitive in the space of its node, with the texture coordinates `set`.
+    /// Mesh of a primitive, with the texture coordinates `set`: in the world if a skin moves it, otherwise in the space of its
+    /// node. The second value says which.
     ///
     /// `None` if the primitive does not consist of triangles.
     fn primitive(
         &mut self,
         primitive: &Primitive,
         set: u32,
-    ) -> Result<Option<TriangleMesh>, String> {
+        pose: &Pose<'a>,
+        own_weights: &[f32],
+    ) -> Result<Option<(TriangleMesh, bool)>, String> {
         if !matches!(
             primitive.mode(),
             Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
@@ -277,66 +353,44 @@ impl<'a> Reader<'a> {
             self.note("points and lines are left out");
             return Ok(None);
         }
-        let position = primitive.get(&Semantic::Positions);
-        let position = position.ok_or("there is no attribute POSITION")?;
-        self.take_memory(primitive, &position)?;
-        let buffers = self.buffers;
-        let reader = primitive.reader(|buffer| buffers.get(buffer.index()).map(|b| &**b));
-        let positions: Vec<_> = match self.check(&position, Dimensions::Vec3, &[DataType::F32])? {
-            0 => Vec::new(),
-            _ => reader.read_positions().into_iter().flatten().collect(),
+        let Some(position) = primitive.get(&Semantic::Positions) else {
+            self.note("primitives without positions are left out");
+            return Ok(None);
         };
+        let is_absent = position.view().is_none() && position.sparse().is_none();
+        if is_absent && primitive.extension_value(DRACO).is_some() {
+            return Err(compressed(DRACO));
+        }
+        let mut positions: Vec<DVec3> =
+            self.elements(&position, Dimensions::Vec3, Numbers::Quantized, DVec3::from)?;
         let vertices = positions.len();
         let corners: Vec<u32> = match primitive.indices() {
             None => (0..u32::try_from(vertices).map_err(|_| "too many vertices")?).collect(),
-            Some(indices) => match self.check(&indices, Dimensions::Scalar, INDEX_TYPES)? {
-                0 => Vec::new(),
-                _ => reader
-                    .read_indices()
-                    .into_iter()
-                    .flat_map(|indices| indices.into_u32())
-                    .collect(),
-            },
+            Some(indices) => {
+                self.elements(&indices, Dimensions::Scalar, Numbers::Whole, |[i]| i as u32)?
+            }
         };
+        // A corner takes an index, and in a strip a triangle as well.
+        self.take_memory(corners.len() as u64 * 12)?;
         if let Some(&corner) = corners.iter().find(|&&corner| corner as usize >= vertices) {
             return Err(format!(
                 "vertex {corner} is used, but there are only {vertices} vertices"
             ));
         }
-        let normals: Vec<_> = match primitive.get(&Semantic::Normals) {
-            Some(normal) if self.check(&normal, Dimensions::Vec3, &[DataType::F32])? > 0 => {
-                reader.read_normals().into_iter().flatten().collect()
+        let normal = Semantic::Normals;
+        let mut normals = self.attribute(primitive, &normal, Dimensions::Vec3, Vec3::from)?;
+        // The origin of glTF is the upper left corner of an image, that of scenes the lower left.
+        let upright = |[u, v]: [f32; 2]| Vec2::new(u, 1.0 - v);
+        let uv = Semantic::TexCoords(set);
+        let uvs = self.attribute(primitive, &uv, Dimensions::Vec2, upright)?;
+        let color = Semantic::Colors(0);
+        let colors = match primitive.get(&color).map(|color| color.dimensions()) {
+            Some(Dimensions::Vec4) => {
+                self.look_note("the alpha of vertex colours is left out");
+                let opaque = |[r, g, b, _]: [f32; 4]| Rgb::new(r, g, b);
+                self.attribute(primitive, &color, Dimensions::Vec4, opaque)?
             }
-            _ => Vec::new(),
-        };
-        let uvs: Vec<Vec2> = match primitive.get(&Semantic::TexCoords(set)) {
-            Some(uv) if self.check(&uv, Dimensions::Vec2, FRACTION_TYPES)? > 0 => {
-                let read = reader.read_tex_coords(set);
-                // The origin of glTF is the upper left corner of an image, that of scenes the lower left.
-                let read = read.into_iter().flat_map(|uvs| uvs.into_f32());
-                read.map(|[u, v]| Vec2::new(u, 1.0 - v)).collect()
-            }
-            _ => Vec::new(),
-        };
-        let colors: Vec<Rgb> = match primitive.get(&Semantic::Colors(0)) {
-            Some(color) => {
-                let dimensions = match color.dimensions() {
-                    Dimensions::Vec4 => Dimensions::Vec4,
-                    _ => Dimensions::Vec3,
-                };
-                if dimensions == Dimensions::Vec4 {
-                    self.note("the alpha of vertex colours is left out");
-                }
-                match self.check(&color, dimensions, FRACTION_TYPES)? {
-                    0 => Vec::new(),
-                    _ => {
-                        let read = reader.read_colors(0);
-                        let read = read.into_iter().flat_map(|colors| colors.into_rgb_f32());
-                        read.map(Rgb::from).collect()
-                    }
-                }
-            }
-            None => Vec::new(),
+            _ => self.attribute(primitive, &color, Dimensions::Vec3, Rgb::from)?,
         };
         for (what, count) in [
             ("normals", normals.len()),
@@ -349,97 +403,103 @@ impl<'a> Reader<'a> {
                 ));
             }
         }
-        Ok(Some(TriangleMesh {
-            positions,
-            indices: triangles(primitive.mode(), &corners),
-            normals: normals
-                .into_iter()
-                .map(|normal: [f32; 3]| Vec3::from(normal).normalize_or_zero())
+        let weights = pose.weights.unwrap_or(own_weights);
+        self.morph(primitive, weights, &mut positions, &mut normals)?;
+        let is_placed = !pose.joints.is_empty()
+            && self.skin(primitive, &pose.joints, &mut positions, &mut normals)?;
+        let mesh = TriangleMesh {
+            positions: positions
+                .iter()
+                .map(|position| position.as_vec3().into())
                 .collect(),
+            indices: triangles(primitive.mode(), &corners),
+            normals: normals.into_iter().map(Vec3::normalize_or_zero).collect(),
             uvs,
             colors,
-        }))
+        };
+        Ok(Some((mesh, is_placed)))
     }
 
-    /// Subtracts the largest possible size of a primitive from the memory left, before the primitive is read.
-    ///
-    /// Counts are as declared by the file. [`Self::check`] compares them with the buffers.
-    fn take_memory(&mut self, primitive: &Primitive, position: &Accessor) -> Result<(), String> {
-        let vertices = position.count() as u64;
-        let corners = primitive.indices().map_or(vertices, |i| i.count() as u64);
-        let attributes = [
-            Semantic::Normals,
-            Semantic::TexCoords(0),
-            Semantic::Colors(0),
-        ];
-        let present = attributes
-            .iter()
-            .filter(|name| primitive.get(name).is_some());
-        let lists = 1 + present.count() as u64;
-        // A corner takes an index, and in a strip a triangle as well.
-        let needed = vertices
-            .saturating_mul(12 * lists)
-            .saturating_add(corners.saturating_mul(16));
+    /// Reads an attribute of a primitive, which may have none.
+    fn attribute<const N: usize, T>(
+        &mut self,
+        primitive: &Primitive,
+        name: &Semantic,
+        dimensions: Dimensions,
+        make: impl Fn([f32; N]) -> T,
+    ) -> Result<Vec<T>, String> {
+        let Some(accessor) = primitive.get(name) else {
+            return Ok(Vec::new());
+        };
+        let numbers = Numbers::of(name, self.is_quantized);
+        let make = |numbers: [f64; N]| make(numbers.map(|number| number as f32));
+        self.elements(&accessor, dimensions, numbers, make)
+    }
+
+    /// Reads the elements of an accessor, if memory allows.
+    pub fn elements<const N: usize, T>(
+        &mut self,
+        accessor: &Accessor,
+        dimensions: Dimensions,
+        numbers: Numbers,
+        make: impl Fn([f64; N]) -> T,
+    ) -> Result<Vec<T>, String> {
+        let bytes = (accessor.count() as u64).saturating_mul(size_of::<T>() as u64);
+        self.take_memory(bytes)
+            .map_err(|reason| format!("accessor {}: {reason}", accessor.index()))?;
+        accessors::read(self.buffers, accessor, dimensions, numbers, make)
+    }
+
+    /// Subtracts bytes from the memory left, before they are taken. Counts are as declared by the file.
+    fn take_memory(&mut self, needed: u64) -> Result<(), String> {
         self.left = self.left.checked_sub(needed).ok_or_else(|| {
+            let left = self.left;
             format!(
-                "{vertices} vertices and {corners} corners take {needed} bytes, but only {} bytes are left of the memory \
-                 allowed",
-                self.left
+                "{needed} bytes are needed, but only {left} bytes are left of the memory allowed"
             )
         })?;
         Ok(())
     }
 
-    /// Checks that an accessor has elements of the given kind, all within its buffer, and returns their number.
-    ///
-    /// The crate checks neither the kind nor overflow of positions. Do not call it for elements if the number is 0.
-    fn check(
-        &self,
-        accessor: &Accessor,
-        dimensions: Dimensions,
-        types: &[DataType],
-    ) -> Result<usize, String> {
-        let index = accessor.index();
-        let (found, kind) = (accessor.dimensions(), accessor.data_type());
-        if found != dimensions || !types.contains(&kind) {
-            return Err(format!(
-                "accessor {index} holds {found:?} of {kind:?}, not {dimensions:?} of {types:?}"
-            ));
-        }
-        let view = accessor.view().filter(|_| accessor.sparse().is_none());
-        let view = view.ok_or_else(|| {
-            format!("accessor {index} is sparse or has no bufferView, which is not supported")
-        })?;
-
-        let (view_index, offset, length) = (view.index(), view.offset(), view.length());
-        let held = self
-            .buffers
-            .get(view.buffer().index())
-            .map_or(0, |b| b.len());
-        if offset.checked_add(length).is_none_or(|end| end > held) {
-            return Err(format!(
-                "bufferView {view_index} has {length} bytes from byte {offset}, but its buffer has only {held}"
-            ));
-        }
-        let (size, count) = (accessor.size(), accessor.count());
-        let stride = view.stride().unwrap_or(size);
-        if stride < size {
-            return Err(format!(
-                "bufferView {view_index} has a stride of {stride} bytes, less than its elements of {size} bytes"
-            ));
-        }
-        let Some(last) = count.checked_sub(1) else {
-            return Ok(0);
+    /// Where a node has its mesh: once, or by the attributes of `EXT_mesh_gpu_instancing`.
+    fn places(&mut self, node: &Node, to_world: DMat4) -> Result<Vec<DMat4>, String> {
+        let json = &self.document.as_json().nodes[node.index()];
+        let Some(attributes) = needs::instancing(json).filter(|list| !list.is_empty()) else {
+            return Ok(vec![to_world]);
         };
-        let end = last
-            .checked_mul(stride)
-            .and_then(|start| start.checked_add(accessor.offset())?.checked_add(size));
-        if end.is_none_or(|end| end > length) {
-            return Err(format!(
-                "accessor {index} has {count} elements, more than fit in the {length} bytes of its bufferView"
-            ));
+        let mut count = None;
+        let (mut moves, mut turns, mut scales) = (Vec::new(), Vec::new(), Vec::new());
+        for (name, index) in attributes {
+            let accessor = self.document.accessors().nth(index);
+            let accessor = accessor.ok_or_else(|| format!("there is no accessor {index}"))?;
+            let quantized = Numbers::Quantized;
+            match name {
+                "TRANSLATION" => {
+                    moves = self.elements(&accessor, Dimensions::Vec3, quantized, DVec3::from)?;
+                }
+                "SCALE" => {
+                    scales = self.elements(&accessor, Dimensions::Vec3, quantized, DVec3::from)?;
+                }
+                "ROTATION" => {
+                    turns =
+                        self.elements(&accessor, Dimensions::Vec4, quantized, DQuat::from_array)?;
+                }
+                _ => {}
+            }
+            let found = accessor.count();
+            if *count.get_or_insert(found) != found {
+                return Err("its attributes of instances have different lengths".into());
+            }
         }
-        Ok(count)
+        let count = count.unwrap_or(0);
+        self.take_memory((count as u64).saturating_mul(PER_INSTANCE))?;
+        let place = |index: usize| {
+            let turn = turns.get(index).copied().unwrap_or(DQuat::IDENTITY);
+            let scale = scales.get(index).copied().unwrap_or(DVec3::ONE);
+            let by = moves.get(index).copied().unwrap_or(DVec3::ZERO);
+            to_world * DMat4::from_scale_rotation_translation(scale, turn.normalize(), by)
+        };
+        Ok((0..count).map(place).collect())
     }
 }
 

@@ -69,7 +69,7 @@ fn read_files(bytes: &[u8], others: &[(&str, &[u8])]) -> Result<Model, Vec<Strin
     for (name, bytes) in others {
         std::fs::write(folder.path().join(name), bytes).expect("a file");
     }
-    parse(bytes, folder.path(), u64::MAX, DVec3::ZERO)
+    parse(bytes, folder.path(), u64::MAX, DVec3::ZERO, true)
 }
 
 #[test]
@@ -196,9 +196,15 @@ fn every_mistake_is_named() {
         ),
         (
             r#""count": 6"#,
-            r#""count": 6, "sparse": {"count": 1, "indices": {"bufferView": 1, "componentType": 5123},
+            r#""count": 6, "sparse": {"count": 1, "indices": {"bufferView": 0, "byteOffset": 14, "componentType": 5123},
                 "values": {"bufferView": 1}}"#,
-            "accessor 1 is sparse",
+            "accessor 1 has 6 elements, but its sparse list changes element 16256",
+        ),
+        (
+            r#""count": 6"#,
+            r#""count": 6, "sparse": {"count": 7, "indices": {"bufferView": 1, "componentType": 5123},
+                "values": {"bufferView": 1}}"#,
+            "accessor 1 has 7 elements, more than fit in the 12 bytes",
         ),
         (
             r#""byteLength": 48"#,
@@ -227,19 +233,18 @@ fn every_mistake_is_named() {
         ),
         (
             r#""componentType": 5126"#,
-            r#""componentType": 5123"#,
-            "accessor 0 holds Vec3 of U16",
+            r#""componentType": 5125"#,
+            "accessor 0 holds Vec3 of U32",
         ),
         (
             r#""mode": 6"#,
             r#""mode": 8"#,
             "primitives[1].mode: Invalid",
         ),
-        (r#""POSITION""#, r#""COLOR""#, "POSITION"),
         (
             r#""KHR_materials_sheen"#,
-            r#""KHR_draco_mesh_compression"#,
-            "\"KHR_draco_mesh_compression\": Unsupported extension",
+            r#""VENDOR_shape"#,
+            "requires the extension VENDOR_shape, which is not supported",
         ),
         (
             r#""asset": {"version": "2.0"},"#,
@@ -321,7 +326,7 @@ fn damaged_files_are_errors_or_other_scenes() {
     let good = glb(&json(""), &square());
     let folder = tempfile::tempdir().expect("a folder");
     let read_bytes = |bytes: &[u8]| {
-        parse(bytes, folder.path(), u64::MAX, DVec3::ZERO).map(|model| model.shapes.len())
+        parse(bytes, folder.path(), u64::MAX, DVec3::ZERO, true).map(|model| model.shapes.len())
     };
     assert_eq!(read_bytes(&good), Ok(2));
     for length in 0..good.len() {
@@ -364,7 +369,13 @@ fn meshes_that_are_named_often_stay_within_the_memory_allowed() {
                 r#"{"children": [1], "translation": [10, 0, 0]}, {"mesh": 0, "scale": [2, 2, 2]}"#,
                 &node,
             );
-            let read = parse(&glb(&text, &square()), Path::new(""), 50_000, DVec3::ZERO);
+            let read = parse(
+                &glb(&text, &square()),
+                Path::new(""),
+                50_000,
+                DVec3::ZERO,
+                true,
+            );
             read.map(|model| (model.shapes.len(), model.instances.len()))
         };
     assert_eq!(many(100, r#"{"mesh": 0}"#), Ok((0, 100)));
@@ -384,9 +395,9 @@ fn meshes_that_are_named_often_stay_within_the_memory_allowed() {
 fn the_json_stays_within_the_memory_allowed() {
     let nodes = vec!["{}"; 10_000].join(",");
     let text = format!(r#"{{"asset": {{"version": "2.0"}}, "nodes": [{nodes}]}}"#);
-    assert!(parse(text.as_bytes(), Path::new(""), 4 << 20, DVec3::ZERO).is_ok());
+    assert!(parse(text.as_bytes(), Path::new(""), 4 << 20, DVec3::ZERO, true).is_ok());
     let mistakes =
-        parse(text.as_bytes(), Path::new(""), 1 << 20, DVec3::ZERO).expect_err("too much");
+        parse(text.as_bytes(), Path::new(""), 1 << 20, DVec3::ZERO, true).expect_err("too much");
     assert!(mistakes[0].contains("the JSON needs"), "{}", mistakes[0]);
 }
 
@@ -576,4 +587,366 @@ fn invisible_surfaces_stay_only_if_nothing_else_is_there() {
     assert_eq!(masks(&text), [None]);
     let text = text.replace("\"mode\": 6", "\"mode\": 6, \"material\": 0");
     assert_eq!(masks(&text), [Some(0.0.into()), Some(0.0.into())]);
+}
+
+/// A GLB of a triangle with the corners 0, x and y, whose buffer goes on with these bytes. In the JSON, `VIEW` begins a view of
+/// so many bytes from there.
+fn triangle(json: &str, more: &[u8]) -> Vec<u8> {
+    let corners = [[0.0_f32, 0., 0.], [1., 0., 0.], [0., 1., 0.]];
+    let corners = corners.iter().flatten().flat_map(|x| x.to_le_bytes());
+    let bytes: Vec<u8> = corners.chain(more.iter().copied()).collect();
+    let json = json.replace("VIEW", r#""buffer": 0, "byteOffset": 36, "byteLength""#);
+    let start = format!(
+        r#"{{"asset": {{"version": "2.0"}}, "buffers": [{{"byteLength": {}}}],
+        "#,
+        bytes.len()
+    );
+    glb(&json.replacen('{', &start, 1), &bytes)
+}
+
+fn floats(values: &[f32]) -> Vec<u8> {
+    values
+        .iter()
+        .flat_map(|value| value.to_le_bytes())
+        .collect()
+}
+
+/// All positions of the world, of shapes and of instances.
+fn positions(model: &Model) -> Vec<[f32; 3]> {
+    let of = |shape: &antumbra_scene::Shape| match &shape.geometry {
+        Geometry::Mesh(mesh) => mesh.positions.clone(),
+        Geometry::Sphere(_) | Geometry::Curves(_) => panic!("a mesh"),
+    };
+    let mut all: Vec<_> = model.shapes.iter().flat_map(of).collect();
+    for instance in &model.instances {
+        let shapes = model.objects[instance.object].shapes.iter();
+        let moved = |point| {
+            instance
+                .world_from_object
+                .transform_point3(Vec3::from(point))
+                .to_array()
+        };
+        all.extend(shapes.flat_map(of).map(moved));
+    }
+    all
+}
+
+const ACCESSOR: &str = r#"{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}"#;
+const CORNERS: &str = r#"{"buffer": 0, "byteLength": 36}"#;
+
+#[test]
+fn skins_ignore_their_node_and_joints_need_not_be_shown() {
+    // Joint 2 is below node 1, which turns x to y, and both are in no scene. Its inverse matrix moves by -1 along x.
+    let json = format!(
+        r#"{{"scenes": [{{"nodes": [0]}}], "animations": [],
+        "nodes": [{{"mesh": 0, "skin": 0, "translation": [10, 0, 0]}},
+            {{"children": [2, 3], "rotation": [0, 0, 0.70710678, 0.70710678]}},
+            {{"translation": [2, 0, 0]}}, {{"translation": [0, 0, 7], "scale": [2, 2, 2]}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0, "NORMAL": 4, "JOINTS_0": 1, "WEIGHTS_0": 2}}}}]}}],
+        "skins": [{{"joints": [3, 2], "inverseBindMatrices": 3}}],
+        "bufferViews": [{CORNERS}, {{VIEW: 12}}, {{"buffer": 0, "byteOffset": 48, "byteLength": 48}},
+            {{"buffer": 0, "byteOffset": 96, "byteLength": 128}}],
+        "accessors": [{ACCESSOR}, {{"bufferView": 1, "componentType": 5121, "count": 3, "type": "VEC4"}},
+            {{"bufferView": 2, "componentType": 5126, "count": 3, "type": "VEC4"}},
+            {{"bufferView": 3, "componentType": 5126, "count": 2, "type": "MAT4"}}, {ACCESSOR}]}}"#
+    );
+    let mut more = vec![1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0];
+    more.extend(floats(&[1., 0., 0., 0., 0.5, 0.5, 0., 0., 2., 0., 0., 0.]));
+    let identity = glam::Mat4::IDENTITY.to_cols_array();
+    let moved = glam::Mat4::from_translation(Vec3::new(-1., 0., 0.)).to_cols_array();
+    more.extend(floats(&[identity, moved].concat()));
+    let model = read_files(&triangle(&json, &more), &[]).expect("a skin");
+    assert!(model.notes.is_empty() && model.warnings.is_empty());
+    // By joint 2: p + 1 along x, turned to y. By joint 3: twice p, turned, and 7 up. The second corner is their mean.
+    let expected = [[0., 1., 0.], [0., 2., 3.5], [-1., 1., 0.]];
+    let found = positions(&model);
+    for (found, expected) in found.iter().zip(expected) {
+        let apart = (Vec3::from(*found) - Vec3::from(expected)).length();
+        assert!(apart < 1e-6, "{found:?} for {expected:?}");
+    }
+    let Geometry::Mesh(mesh) = &model.shapes[0].geometry else {
+        panic!("a mesh")
+    };
+    // The normals are the positions: 0, x and y, turned.
+    let turned = [Vec3::ZERO, Vec3::Y, Vec3::NEG_X];
+    assert!(
+        mesh.normals
+            .iter()
+            .zip(turned)
+            .all(|(n, t)| (*n - t).length() < 1e-6)
+    );
+    let broken = json.replace(r#""joints": [3, 2]"#, r#""joints": [3]"#);
+    let mistakes = read_files(&triangle(&broken, &more), &[]).expect_err("no joint 1");
+    assert_eq!(
+        mistakes,
+        ["mesh 0, primitive 0: joint 1 is used, but the skin has only 1"]
+    );
+    // A primitive without joints is placed by its node.
+    let plain = json.replace(r#""JOINTS_0": 1, "#, "");
+    let model = read_files(&triangle(&plain, &more), &[]).expect("a mesh");
+    assert_eq!(positions(&model)[0], [10., 0., 0.]);
+}
+
+#[test]
+fn morph_targets_have_the_weights_of_mesh_or_node() {
+    let json = format!(
+        r#"{{"scenes": [{{"nodes": [0, 1]}}],
+        "nodes": [{{"mesh": 0}}, {{"mesh": 0, "weights": [0, 4], "translation": [0, 0, 100]}}],
+        "meshes": [{{"weights": [0.5, 0], "primitives": [{{"attributes": {{"POSITION": 0}},
+            "targets": [{{"POSITION": 1}}, {{"POSITION": 2}}]}}]}}],
+        "bufferViews": [{CORNERS}, {{VIEW: 36}}],
+        "accessors": [{ACCESSOR}, {{"bufferView": 1, "componentType": 5126, "count": 3, "type": "VEC3"}},
+            {{"componentType": 5126, "count": 3, "type": "VEC3", "sparse": {{"count": 1,
+                "indices": {{"bufferView": 0, "componentType": 5121}}, "values": {{"bufferView": 1}}}}}}]}}"#
+    );
+    let more = floats(&[0., 0., 4., 0., 0., 4., 0., 0., 8.]);
+    let model = read_files(&triangle(&json, &more), &[]).expect("targets");
+    let expected = [
+        [0., 0., 2.],
+        [1., 0., 2.],
+        [0., 1., 4.],
+        [0., 0., 116.],
+        [1., 0., 100.],
+        [0., 1., 100.],
+    ];
+    assert_eq!(positions(&model), expected);
+    assert!(model.notes.is_empty() && model.warnings.is_empty());
+}
+
+#[test]
+fn instances_of_an_extension_are_instances() {
+    let json = format!(
+        r#"{{"scenes": [{{"nodes": [0]}}], "extensionsUsed": ["EXT_mesh_gpu_instancing"],
+        "nodes": [{{"mesh": 0, "scale": [2, 2, 2], "extensions": {{"EXT_mesh_gpu_instancing": {{"attributes":
+            {{"TRANSLATION": 1, "ROTATION": 2, "_ID": 1}}}}}}}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}],
+        "bufferViews": [{CORNERS}, {{VIEW: 24}}, {{"buffer": 0, "byteOffset": 60, "byteLength": 16}}],
+        "accessors": [{ACCESSOR}, {{"bufferView": 1, "componentType": 5126, "count": 2, "type": "VEC3"}},
+            {{"bufferView": 2, "componentType": 5122, "normalized": true, "count": 2, "type": "VEC4"}}]}}"#
+    );
+    let mut more = floats(&[5., 0., 0., 0., 0., -1.]);
+    for turn in [[0_i16, 0, 0, 32767], [0, 0, 32767, 0]] {
+        more.extend(turn.iter().flat_map(|x| x.to_le_bytes()));
+    }
+    let model = read_files(&triangle(&json, &more), &[]).expect("instances");
+    assert_eq!(
+        (
+            model.shapes.len(),
+            model.objects.len(),
+            model.instances.len()
+        ),
+        (0, 1, 2)
+    );
+    assert!(model.notes.is_empty() && model.warnings.is_empty());
+    let expected = [
+        [10., 0., 0.],
+        [12., 0., 0.],
+        [10., 2., 0.],
+        [0., 0., -2.],
+        [-2., 0., -2.],
+        [0., -2., -2.],
+    ];
+    for (found, expected) in positions(&model).iter().zip(expected) {
+        assert!(
+            (Vec3::from(*found) - Vec3::from(expected)).length() < 1e-5,
+            "{found:?}"
+        );
+    }
+    let broken = json.replace(
+        r#"5122, "normalized": true, "count": 2"#,
+        r#"5122, "count": 1"#,
+    );
+    let mistakes = read_files(&triangle(&broken, &more), &[]).expect_err("lengths");
+    assert!(mistakes[0].contains("different lengths"), "{mistakes:?}");
+    let hidden = json.replace(
+        r#""extensions": {"#,
+        r#""extensions": {"KHR_node_visibility": {"visible": false}, "#,
+    );
+    assert_eq!(
+        read_files(&triangle(&hidden, &more), &[])
+            .expect("nothing")
+            .triangles(),
+        0
+    );
+}
+
+#[test]
+fn quantized_sparse_and_absent_numbers_are_read() {
+    let with = |kind: u32, more: &str, size: usize| {
+        let kind = format!(r#""componentType": {kind}, "count": 3, "type": "VEC3""#);
+        format!(
+            r#"{{"scenes": [{{"nodes": [0]}}], "extensionsRequired": ["KHR_mesh_quantization"],
+            "extensionsUsed": ["KHR_mesh_quantization"],
+            "nodes": [{{"mesh": 0}}], "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}}}]}}],
+            "bufferViews": [{{VIEW: {size}}}, {CORNERS}], "accessors": [{{{more} {kind}}}]}}"#
+        )
+    };
+    let view = r#""bufferView": 0,"#;
+    let normalized = r#""bufferView": 0, "normalized": true,"#;
+    let bytes = [0, 127, 0x81, 0x80, 0, 3, 255, 1, 2];
+    let shorts: Vec<u8> = [0_i16, 32767, -32768, 1, 2, 3, -3, 0, 8]
+        .iter()
+        .flat_map(|x| x.to_le_bytes())
+        .collect();
+    let sparse = r#""sparse": {"count": 1, "indices": {"bufferView": 0, "componentType": 5123},
+        "values": {"bufferView": 1, "byteOffset": 12}},"#;
+    let based = sparse.replace(r#""sparse""#, r#""bufferView": 1, "sparse""#);
+    let place = 2_u16.to_le_bytes();
+    for (kind, more, data, expected) in [
+        (
+            5120,
+            view,
+            &bytes[..],
+            [[0., 127., -127.], [-128., 0., 3.], [-1., 1., 2.]],
+        ),
+        (
+            5120,
+            normalized,
+            &bytes,
+            [
+                [0., 1., -1.],
+                [-1., 0., 3. / 127.],
+                [-1. / 127., 1. / 127., 2. / 127.],
+            ],
+        ),
+        (
+            5121,
+            normalized,
+            &bytes,
+            [
+                [0., 127. / 255., 129. / 255.],
+                [128. / 255., 0., 3. / 255.],
+                [1., 1. / 255., 2. / 255.],
+            ],
+        ),
+        (
+            5122,
+            view,
+            &shorts,
+            [[0., 32767., -32768.], [1., 2., 3.], [-3., 0., 8.]],
+        ),
+        (
+            5126,
+            sparse,
+            &place,
+            [[0., 0., 0.], [0., 0., 0.], [1., 0., 0.]],
+        ),
+        (
+            5126,
+            &based,
+            &place,
+            [[0., 0., 0.], [1., 0., 0.], [1., 0., 0.]],
+        ),
+        (5126, "", &place, [[0.; 3]; 3]),
+    ] {
+        let json = with(kind, more, data.len());
+        let model = read_files(&triangle(&json, data), &[]).expect(&json);
+        assert_eq!(positions(&model), expected, "{json}");
+    }
+}
+
+#[test]
+fn only_what_is_shown_is_checked() {
+    let json = format!(
+        r#"{{"scene": 1, "scenes": [{{}}, {{"nodes": [1]}}],
+        "nodes": [{{"mesh": 1, "skin": 9, "children": [77]}}, {{"mesh": 0}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0, "COLOR": 77}}}}, {{"attributes": {{}}}}]}},
+            {{"primitives": [{{"attributes": {{"POSITION": 50}}, "material": 3}}]}}],
+        "animations": [{{"channels": [{{"sampler": 4, "target": {{"node": 9, "path": "dance"}}}}], "samplers": []}}],
+        "bufferViews": [{CORNERS}, {{"buffer": 8, "byteLength": 1}}],
+        "accessors": [{ACCESSOR}, {{"bufferView": 9, "componentType": 1, "count": 3, "type": "VEC9"}}]}}"#
+    );
+    let model = read_files(&triangle(&json, &[]), &[]).expect("the second scene");
+    assert_eq!(model.triangles(), 1);
+    assert_eq!(
+        model.notes,
+        [
+            "animations are left out: everything is shown at rest",
+            "primitives without positions are left out"
+        ]
+    );
+    let other = json.replace(r#""nodes": [1]"#, r#""nodes": [0]"#);
+    assert!(read_files(&triangle(&other, &[]), &[]).is_err());
+}
+
+#[test]
+fn other_versions_and_compressed_files_are_refused_with_a_command() {
+    let refused = |bytes: &[u8]| {
+        let mistakes = read_files(bytes, &[]).expect_err("refused");
+        let [mistake] = <[String; 1]>::try_from(mistakes).expect("one line");
+        mistake
+    };
+    let mut binary = glb(&json(""), &square());
+    binary[4] = 1;
+    for old in [
+        &br#"{"asset": {"version": "1.0"}, "accessors": {}, "meshes": {}}"#[..],
+        br#"{"accessors": {}, "meshes": {"a": {}}}"#,
+        &binary,
+    ] {
+        let mistake = refused(old);
+        assert!(mistake.contains("glTF version `1.0`"), "{mistake}");
+        assert!(
+            mistake.contains("`gltf-pipeline -i IN.gltf -o OUT.gltf`"),
+            "{mistake}"
+        );
+    }
+    for name in ["KHR_draco_mesh_compression", "EXT_meshopt_compression"] {
+        let required = json("").replace("KHR_materials_sheen", name);
+        let mistake = refused(&glb(&required, &square()));
+        assert!(
+            mistake.contains(name) && mistake.contains("`gltf-transform copy"),
+            "{mistake}"
+        );
+    }
+    // Not required, but without other positions.
+    let draco = json("").replacen(
+        r#""bufferView": 0, "componentType""#,
+        r#""componentType""#,
+        1,
+    );
+    let draco = draco.replacen(
+        r#""indices": 1"#,
+        r#""indices": 1, "extensions": {"KHR_draco_mesh_compression": {}}"#,
+        1,
+    );
+    assert!(refused(&glb(&draco, &square())).contains("`gltf-transform copy"));
+    // Not required: the mesh is there as well.
+    let both = json("").replacen(
+        r#""indices": 1"#,
+        r#""indices": 1, "extensions": {"KHR_draco_mesh_compression": {}}"#,
+        1,
+    );
+    assert_eq!(
+        read_files(&glb(&both, &square()), &[])
+            .expect("a mesh")
+            .triangles(),
+        4
+    );
+}
+
+#[test]
+fn what_may_move_the_model_is_a_warning() {
+    let used = |name: &str| {
+        let used = format!(r#""extensionsUsed": ["{name}"], "accessors""#);
+        json("").replacen(r#""accessors""#, &used, 1)
+    };
+    let read = |text: &str, looks: bool| {
+        parse(
+            &glb(text, &square()),
+            Path::new(""),
+            u64::MAX,
+            DVec3::ZERO,
+            looks,
+        )
+        .expect("a model")
+    };
+    let model = read(&used("CESIUM_RTC"), true);
+    assert!(
+        model.warnings[0].text.contains("CESIUM_RTC"),
+        "{:?}",
+        model.warnings
+    );
+    let sheen = used("KHR_materials_sheen");
+    assert_eq!(read(&sheen, true).notes.len(), 2);
+    assert_eq!(read(&sheen, false).notes, ["points and lines are left out"]);
 }
