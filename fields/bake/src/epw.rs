@@ -46,6 +46,18 @@ const DIFFUSE: usize = 15;
 /// From this value on, an irradiance is a mark for one that is missing.
 const MISSING: f64 = 9999.0;
 
+/// Fields of a line: between commas that are not in quotes, without quotes and blanks around them.
+fn fields(line: &str) -> Vec<&str> {
+    let mut is_quoted = false;
+    let ends = |c: char| {
+        is_quoted ^= c == '"';
+        c == ',' && !is_quoted
+    };
+    let fields = line.split(ends);
+    let bare = fields.map(|field| field.trim().trim_matches('"').trim());
+    bare.collect()
+}
+
 impl Weather {
     /// Reads a file. Irradiance that is missing counts as 0.
     ///
@@ -59,12 +71,8 @@ impl Weather {
             .map(|(index, line)| (index + 1, line));
         let bad = |line, reason: String| BadWeather { line, reason };
         let (_, first) = lines.next().unwrap_or((1, ""));
-        let fields: Vec<&str> = first
-            .trim_start_matches('\u{feff}')
-            .split(',')
-            .map(str::trim)
-            .collect();
-        if !fields[0].eq_ignore_ascii_case("LOCATION") || fields.len() < 10 {
+        let found = fields(first.trim_start_matches('\u{feff}'));
+        if !found[0].eq_ignore_ascii_case("LOCATION") || found.len() < 10 {
             let reason = "found no LOCATION with ten fields, as the first line of an .epw file has";
             return Err(bad(1, reason.into()));
         }
@@ -72,13 +80,20 @@ impl Weather {
             let number = text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
             number.ok_or_else(|| bad(line, format!("{what}: found {text:?}, wanted a number")))
         };
-        let place = Place {
-            latitude: number(1, "latitude", fields[6])?,
-            longitude: number(1, "longitude", fields[7])?,
-            height: number(1, "elevation", fields[9])?,
+        let within = |what: &str, text: &str, most: f64| match number(1, what, text) {
+            Ok(found) if found.abs() > most => {
+                let reason = format!("{what}: found {found}, wanted -{most} to {most}");
+                Err(bad(1, reason))
+            }
+            found => found,
         };
-        let zone = number(1, "time zone", fields[8])?;
-        let name = [fields[1], fields[2], fields[3]];
+        let place = Place {
+            latitude: within("latitude", found[6], 90.0)?,
+            longitude: within("longitude", found[7], 180.0)?,
+            height: number(1, "elevation", found[9])?,
+        };
+        let zone = within("time zone", found[8], 15.0)?;
+        let name = [found[1], found[2], found[3]];
         let name: Vec<&str> = name
             .into_iter()
             .filter(|name| !["", "-"].contains(name))
@@ -92,8 +107,8 @@ impl Weather {
         };
         let mut periods = None;
         for (line, text) in lines {
-            let fields: Vec<&str> = text.split(',').collect();
-            if fields[0].trim().eq_ignore_ascii_case("DATA PERIODS") {
+            let fields = fields(text);
+            if fields[0].eq_ignore_ascii_case("DATA PERIODS") {
                 let found = Periods::read(line, &fields).map_err(|reason| bad(line, reason))?;
                 periods = Some(found);
             } else if let Some(periods) = periods.as_ref().filter(|_| !text.trim().is_empty()) {
@@ -123,7 +138,7 @@ struct Periods {
     days: Vec<[Day; 2]>,
 }
 
-/// A day as `month/day`, or `month/day/year` if its year counts.
+/// A day as `month/day`, or as `month/day/year` or `year/month/day` if its year counts.
 #[derive(Clone, Copy, PartialEq)]
 struct Day {
     month: u32,
@@ -189,11 +204,14 @@ impl Day {
         let mut numbers = text
             .split('/')
             .map(|number| number.trim().parse::<u32>().ok());
-        let (month, day) = (numbers.next()??, numbers.next()??);
-        let year = match numbers.next() {
-            Some(year) => Some(i32::try_from(year?).ok()?),
-            None => None,
+        let [first, second] = [numbers.next()??, numbers.next()??];
+        let third = numbers.next();
+        let (year, month, day) = match third {
+            Some(day) if first > 31 => (Some(first), second, day?),
+            Some(year) => (Some(year?), first, second),
+            None => (None, first, second),
         };
+        let year = year.map(i32::try_from).transpose().ok()?;
         // Without a year, the 29th of February exists.
         Moment::midnight(year.unwrap_or(2004), month, day)?;
         let is_end = numbers.next().is_none();
@@ -338,6 +356,15 @@ mod tests {
     }
 
     #[test]
+    fn names_in_quotes_may_have_commas() {
+        let text = days("1,1,Data,Sunday,2/28,2/28", &[[1999, 2, 28]]);
+        let text = text.replace("Wien,-,", "\"Frankfurt, Main\", \"-\" ,");
+        let weather = Weather::read(&format!("\u{feff}{text}")).expect("a file");
+        assert_eq!(weather.name, "Frankfurt, Main, AUT");
+        assert_eq!((weather.place.latitude, weather.zone), (48.25, 1.0));
+    }
+
+    #[test]
     fn quarters_of_an_hour() {
         let mut text = format!("{HEAD}DATA PERIODS,1,4,Data,Sunday,6/1,6/1\n");
         for hour in 1..=24 {
@@ -367,6 +394,13 @@ mod tests {
                 true,
             ),
             ("1,1,Data,Sunday,2/28/2004,3/1/2004", &[feb, march], false),
+            (
+                "1,1,Data,Sunday,2004/ 2/28,2004/3/1",
+                &[feb, leap, march],
+                true,
+            ),
+            ("1,1,Data,Sunday,2004/2/28,2004/3/1", &[feb, march], false),
+            ("1,1,\"a, b\",Sunday,2/28,2001/2/28", &[feb], true),
             ("1,1,Data,Sunday,2/28,2/28", &[feb], true),
             ("1,1,Data,Sunday,12/31,1/1", &[last, first], true),
             (
@@ -409,6 +443,8 @@ mod tests {
             (String::new(), 1, "LOCATION"),
             ("place,1\n".into(), 1, "LOCATION"),
             (HEAD.replace("48.25", "north"), 1, "latitude"),
+            (HEAD.replace("48.25", "110350"), 1, "-90 to 90"),
+            (HEAD.replace(",1.0,", ",200.0,"), 1, "-15 to 15"),
             (HEAD.to_owned(), 7, "DATA PERIODS"),
             (format!("{HEAD}DATA PERIODS,1,7\n{good}"), 8, "60"),
             (format!("{HEAD}DATA PERIODS,0,1\n{good}"), 8, "periods"),

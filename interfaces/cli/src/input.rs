@@ -36,9 +36,13 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     Ok(bytes)
 }
 
-/// The text of a file whose contents take as much memory again. Bytes that are no UTF-8 are of Latin-1, as names often are.
+/// The text of a file whose contents take as much memory again, without a byte order mark. Bytes that are no UTF-8 are of
+/// Latin-1, as names often are.
 pub fn text(path: &Path) -> Result<String, Failure> {
-    let text = String::from_utf8(read(path)?);
+    let mut bytes = read(path)?;
+    let mark = bytes.len() - antumbra_scene::without_mark(&bytes).len();
+    bytes.drain(..mark);
+    let text = String::from_utf8(bytes);
     let latin = |bytes: &[u8]| bytes.iter().map(|&byte| char::from(byte)).collect();
     Ok(text.unwrap_or_else(|error| latin(error.as_bytes())))
 }
