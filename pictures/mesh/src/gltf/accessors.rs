@@ -155,7 +155,7 @@ pub(super) fn read<const N: usize, T>(
 }
 
 /// Rows of a view for an accessor, all within their buffer: from an offset, so many, of so many bytes. `stride` is the
-/// distance if it is not that of the view.
+/// distance of rows, if it is not the view's own.
 fn rows<'a>(
     buffers: &'a [Cow<'_, [u8]>],
     view: &View,

@@ -323,12 +323,19 @@ fn a_file_without_scenes_starts_with_its_roots() {
 /// The random numbers use the multiplier of Knuth's MMIX.
 #[test]
 fn damaged_files_are_errors_or_other_scenes() {
-    let good = glb(&json(""), &square());
+    damage(&glb(&json(""), &square()), 2, 20_000);
+    for ((json, more), shapes) in [(skinned(), 1), (morphed(), 2), (instanced(), 0)] {
+        damage(&triangle(&json, &more), shapes, 5_000);
+    }
+}
+
+/// Reads a file of so many shapes in parts, and with so many random changes.
+fn damage(good: &[u8], shapes: usize, rounds: usize) {
     let folder = tempfile::tempdir().expect("a folder");
     let read_bytes = |bytes: &[u8]| {
         parse(bytes, folder.path(), u64::MAX, DVec3::ZERO, true).map(|model| model.shapes.len())
     };
-    assert_eq!(read_bytes(&good), Ok(2));
+    assert_eq!(read_bytes(good), Ok(shapes));
     for length in 0..good.len() {
         assert!(read_bytes(&good[..length]).is_err(), "{length}");
     }
@@ -336,8 +343,8 @@ fn damaged_files_are_errors_or_other_scenes() {
     println!("seed {seed}");
     let mut state = seed;
     let mut read = 0;
-    for round in 0..20_000 {
-        let mut bytes = good.clone();
+    for round in 0..rounds {
+        let mut bytes = good.to_vec();
         for _ in 0..3 {
             state = state
                 .wrapping_mul(6364136223846793005)
@@ -634,8 +641,8 @@ fn positions(model: &Model) -> Vec<[f32; 3]> {
 const ACCESSOR: &str = r#"{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"}"#;
 const CORNERS: &str = r#"{"buffer": 0, "byteLength": 36}"#;
 
-#[test]
-fn skins_ignore_their_node_and_joints_need_not_be_shown() {
+/// A triangle with a skin whose joints are in no scene: its JSON and its bytes.
+fn skinned() -> (String, Vec<u8>) {
     // Joint 2 is below node 1, which turns x to y, and both are in no scene. Its inverse matrix moves by -1 along x.
     let json = format!(
         r#"{{"scenes": [{{"nodes": [0]}}], "animations": [],
@@ -655,6 +662,12 @@ fn skins_ignore_their_node_and_joints_need_not_be_shown() {
     let identity = glam::Mat4::IDENTITY.to_cols_array();
     let moved = glam::Mat4::from_translation(Vec3::new(-1., 0., 0.)).to_cols_array();
     more.extend(floats(&[identity, moved].concat()));
+    (json, more)
+}
+
+#[test]
+fn skins_ignore_their_node_and_joints_need_not_be_shown() {
+    let (json, more) = skinned();
     let model = read_files(&triangle(&json, &more), &[]).expect("a skin");
     assert!(model.notes.is_empty() && model.warnings.is_empty());
     // By joint 2: p + 1 along x, turned to y. By joint 3: twice p, turned, and 7 up. The second corner is their mean.
@@ -687,8 +700,8 @@ fn skins_ignore_their_node_and_joints_need_not_be_shown() {
     assert_eq!(positions(&model)[0], [10., 0., 0.]);
 }
 
-#[test]
-fn morph_targets_have_the_weights_of_mesh_or_node() {
+/// A triangle with two targets, of which the second is sparse: its JSON and its bytes.
+fn morphed() -> (String, Vec<u8>) {
     let json = format!(
         r#"{{"scenes": [{{"nodes": [0, 1]}}],
         "nodes": [{{"mesh": 0}}, {{"mesh": 0, "weights": [0, 4], "translation": [0, 0, 100]}}],
@@ -699,7 +712,12 @@ fn morph_targets_have_the_weights_of_mesh_or_node() {
             {{"componentType": 5126, "count": 3, "type": "VEC3", "sparse": {{"count": 1,
                 "indices": {{"bufferView": 0, "componentType": 5121}}, "values": {{"bufferView": 1}}}}}}]}}"#
     );
-    let more = floats(&[0., 0., 4., 0., 0., 4., 0., 0., 8.]);
+    (json, floats(&[0., 0., 4., 0., 0., 4., 0., 0., 8.]))
+}
+
+#[test]
+fn morph_targets_have_the_weights_of_mesh_or_node() {
+    let (json, more) = morphed();
     let model = read_files(&triangle(&json, &more), &[]).expect("targets");
     let expected = [
         [0., 0., 2.],
@@ -713,8 +731,8 @@ fn morph_targets_have_the_weights_of_mesh_or_node() {
     assert!(model.notes.is_empty() && model.warnings.is_empty());
 }
 
-#[test]
-fn instances_of_an_extension_are_instances() {
+/// A triangle in two places by `EXT_mesh_gpu_instancing`: its JSON and its bytes.
+fn instanced() -> (String, Vec<u8>) {
     let json = format!(
         r#"{{"scenes": [{{"nodes": [0]}}], "extensionsUsed": ["EXT_mesh_gpu_instancing"],
         "nodes": [{{"mesh": 0, "scale": [2, 2, 2], "extensions": {{"EXT_mesh_gpu_instancing": {{"attributes":
@@ -728,6 +746,12 @@ fn instances_of_an_extension_are_instances() {
     for turn in [[0_i16, 0, 0, 32767], [0, 0, 32767, 0]] {
         more.extend(turn.iter().flat_map(|x| x.to_le_bytes()));
     }
+    (json, more)
+}
+
+#[test]
+fn instances_of_an_extension_are_instances() {
+    let (json, more) = instanced();
     let model = read_files(&triangle(&json, &more), &[]).expect("instances");
     assert_eq!(
         (
