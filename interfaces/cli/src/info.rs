@@ -5,9 +5,8 @@ use std::time::Instant;
 use antumbra::recipe::Builder;
 use antumbra::{Isa, Width};
 use antumbra_lab::{Machine, count};
-use antumbra_load::{IntegratorKind, Loaded, MemorySize};
+use antumbra_load::{Extent, IntegratorKind, Loaded, MemorySize};
 use antumbra_scene::{Geometry, Light, Material, Projection, Scene};
-use glam::DVec3;
 use serde::Serialize;
 
 use crate::args::{InfoArgs, start_threads};
@@ -37,7 +36,7 @@ struct Document {
     dropped_primitives: usize,
     materials: Materials,
     lights: Lights,
-    /// Corners of the box around everything, in the world.
+    /// Corners of the smallest box around everything, in the world.
     bounds: Option<[[f64; 3]; 2]>,
     /// Where positions are measured from, so that single precision holds them.
     origin: [f64; 3],
@@ -138,7 +137,7 @@ pub fn run(args: &InfoArgs, memory: MemorySize) -> Result<(), Failure> {
     }
     files.check()?;
     start_threads(None)?;
-    let mut loaded = scenes::load(&args.scene, memory)?;
+    let mut loaded = scenes::load_with_looks(&args.scene, memory)?;
     scenes::apply_pose(&mut loaded, &args.pose)?;
     scenes::tell_read(&loaded, args.pose.up);
     files.reads_all(&loaded.inputs)?;
@@ -150,18 +149,16 @@ pub fn run(args: &InfoArgs, memory: MemorySize) -> Result<(), Failure> {
 fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
     let scene = &loaded.scene;
     let world = scenes::world(scene, builder)?;
+    let extent = Extent::of(scene);
     let isa = Isa::best();
     let mut trees = Vec::new();
-    let (mut dropped, mut primitives, mut bounds) = (0, 0, None);
+    let (mut dropped, mut primitives) = (0, 0);
     for width in Width::ALL {
         let start = Instant::now();
         let bvh = world.bvh(antumbra_trees::engine(isa, width));
         let seconds = start.elapsed().as_secs_f64();
         let report = bvh.report();
         (dropped, primitives) = (report.dropped, report.primitives);
-        let all = bvh.bounds();
-        let seen = |corner: [f32; 3]| (DVec3::from(corner.map(f64::from)) + scene.origin).into();
-        bounds = (primitives > 0).then(|| [all.min, all.max].map(seen));
         trees.push(TreeInfo {
             width: width.lanes(),
             nodes: report.nodes,
@@ -190,7 +187,7 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
         dropped_primitives: dropped,
         materials: materials(scene),
         lights: lights(scene),
-        bounds,
+        bounds: extent.map(|Extent { low, high }| [low, high].map(|at| (at + scene.origin).into())),
         origin: scene.origin.into(),
         up: loaded.up.axis.to_string(),
         up_reason: loaded.up.reason,

@@ -10,10 +10,10 @@ use antumbra_scene::{
     Camera, Environment, EnvironmentMapping, Film, Geometry, Image, Integrator, Light, Material,
     Param, Rgb, Sampler, SamplerKind, Scene, Shape, TriangleMesh,
 };
-use glam::{Mat3, Mat4, Vec3};
+use glam::{DVec3, Mat3, Mat4, Vec3};
 
 use crate::clear_sky;
-use crate::extent::for_each_point;
+use crate::extent::{Extent, for_each_point};
 
 /// Direction from the mesh to the camera. Low enough for the horizon to be in the picture.
 const TO_CAMERA: Vec3 = Vec3::new(0.55, 0.27, 1.0);
@@ -326,13 +326,12 @@ fn centred(
 /// Cameras are to be framed before: the plane is far larger than the scene.
 pub fn set_ground(scene: &mut Scene, up: Up) {
     let world_from_stage = up.matrix();
-    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
-    for_each_point(scene, &mut |point| {
-        if point.is_finite() {
-            let point = world_from_stage.transpose() * point;
-            (low, high) = (low.min(point), high.max(point));
-        }
-    });
+    let Some(extent) = Extent::of(scene) else {
+        return;
+    };
+    let seen = |corner: DVec3| world_from_stage.transpose() * corner.as_vec3();
+    let [one, other] = [extent.low, extent.high].map(seen);
+    let (low, high) = (one.min(other), one.max(other));
     let size = (high - low).length();
     if !(size.is_finite() && size > 0.0) {
         return;
@@ -432,6 +431,9 @@ mod tests {
 
     fn mesh(positions: Vec<[f32; 3]>) -> Scene {
         let mesh = TriangleMesh {
+            indices: (0..positions.len() as u32)
+                .map(|vertex| [vertex; 3])
+                .collect(),
             positions,
             ..Default::default()
         };
