@@ -40,6 +40,39 @@ pub trait BuildMonitor: Sync {
 
 impl BuildMonitor for () {}
 
+/// A monitor that stays cancelled once it has said so: whatever a step leaves undone then, the build ends with an error.
+pub(crate) struct Latched<'a> {
+    monitor: &'a dyn BuildMonitor,
+    is_cancelled: AtomicBool,
+}
+
+impl<'a> Latched<'a> {
+    pub fn new(monitor: &'a dyn BuildMonitor) -> Self {
+        Self {
+            monitor,
+            is_cancelled: AtomicBool::new(false),
+        }
+    }
+}
+
+impl BuildMonitor for Latched<'_> {
+    fn progress(&self, done: f32) {
+        self.monitor.progress(done);
+    }
+
+    fn cancelled(&self) -> bool {
+        if !self.is_cancelled.cancelled() && self.monitor.cancelled() {
+            self.is_cancelled.store(true, Ordering::Relaxed);
+        }
+        self.is_cancelled.cancelled()
+    }
+}
+
+/// `None` if a build was cancelled.
+pub(crate) fn goes_on(monitor: &dyn BuildMonitor) -> Option<()> {
+    (!monitor.cancelled()).then_some(())
+}
+
 impl BuildMonitor for AtomicBool {
     fn cancelled(&self) -> bool {
         self.load(Ordering::Relaxed)

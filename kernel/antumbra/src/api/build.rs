@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::geometry::Geometry;
 use crate::geometry::motion::locate;
 use crate::geometry::primitives::Primitives;
-use crate::monitor::BuildMonitor;
+use crate::monitor::{BuildMonitor, Latched};
 use crate::ray::Ray;
 
 /// What a tree is built over, how, for which rays, and who watches.
@@ -105,8 +105,8 @@ impl<'a> Build<'a> {
         Self { times, ..self }
     }
 
-    /// With a monitor, which receives the progress of the build and may stop it. Sorting primitives into a first tree and
-    /// writing nodes are not interrupted.
+    /// With a monitor, which receives the progress of the build and may stop it. It is queried every few milliseconds, but
+    /// not while primitives are copied and nodes written: these steps take a few tenths of a second for a million triangles.
     pub fn monitor(self, monitor: &'a dyn BuildMonitor) -> Self {
         Self { monitor, ..self }
     }
@@ -161,7 +161,8 @@ impl<'a> Build<'a> {
             primitives.moves(),
             "a stage makes trees of what stands still",
         )?;
-        let binary = BinaryStage::new(&primitives, self.rays, &self.recipe, self.monitor)?;
+        let monitor = &Latched::new(self.monitor);
+        let binary = BinaryStage::new(&primitives, self.rays, &self.recipe, monitor)?;
         Ok(Stage::new(primitives, binary))
     }
 
@@ -181,9 +182,10 @@ impl<'a> Build<'a> {
             monitor,
             ..
         } = self;
+        let monitor = &Latched::new(*monitor);
         let learned = |primitives: &Primitives, rays: &[Ray]| {
-            let stage = BinaryStage::new(primitives, rays, recipe, *monitor)?;
-            stage.learn(primitives, rays, recipe, *monitor)
+            let stage = BinaryStage::new(primitives, rays, recipe, monitor)?;
+            stage.learn(primitives, rays, recipe, monitor)
         };
         if !primitives.moves() {
             return learned(primitives, rays);

@@ -23,7 +23,7 @@ use crate::error::Error;
 use crate::geometry::primitives::Primitives;
 use crate::learn::TreeLog;
 use crate::learn::surface_rays::{default_count, surface_rays};
-use crate::monitor::BuildMonitor;
+use crate::monitor::{BuildMonitor, Latched};
 use crate::order::Order;
 use crate::ray::Ray;
 use crate::tree::binary::BinaryTree;
@@ -78,7 +78,7 @@ impl Stage {
         recipe: &Recipe,
         monitor: &dyn BuildMonitor,
     ) -> Result<Bvh, Error> {
-        (self.binary).collapse(&self.primitives, rays, recipe, monitor)
+        (self.binary).collapse(&self.primitives, rays, recipe, &Latched::new(monitor))
     }
 
     /// Wide tree in its child order, ready for queries: learned from `rays`, or without any from surface rays.
@@ -91,7 +91,7 @@ impl Stage {
         recipe: &Recipe,
         monitor: &dyn BuildMonitor,
     ) -> Result<Bvh, Error> {
-        (self.binary).learn(&self.primitives, rays, recipe, monitor)
+        (self.binary).learn(&self.primitives, rays, recipe, &Latched::new(monitor))
     }
 }
 
@@ -105,7 +105,8 @@ pub(super) fn reached(done: f32, monitor: &dyn BuildMonitor) -> Result<(), Error
     }
 }
 
-/// A [`Stage`] without its primitives. Every step must be given the primitives of the first.
+/// A [`Stage`] without its primitives. Every step must be given the primitives of the first, and a monitor that [stays
+/// cancelled](Latched).
 #[derive(Debug)]
 pub(crate) struct BinaryStage {
     pub(super) tree: BinaryTree,
@@ -150,8 +151,13 @@ impl BinaryStage {
     }
 
     /// Log of the surface rays of a recipe. Made on first use, in the current rayon pool, and kept for all recipes that want
-    /// as many.
-    fn surface_log(&self, primitives: &Primitives, recipe: &Recipe) -> Cow<'_, TreeLog> {
+    /// as many. A log that the monitor stopped is not kept.
+    fn surface_log(
+        &self,
+        primitives: &Primitives,
+        recipe: &Recipe,
+        monitor: &dyn BuildMonitor,
+    ) -> Cow<'_, TreeLog> {
         let count = recipe.training.surface_rays;
         if let Some(made) = self.surface_log.get()
             && made.count == count
@@ -159,12 +165,15 @@ impl BinaryStage {
             return Cow::Borrowed(&made.log);
         }
         let mut stopwatch = Stopwatch::new(recipe.clock);
-        let log = TreeLog::of_surfaces(primitives, &self.tree, count);
+        let log = TreeLog::of_surfaces_until(primitives, &self.tree, count, monitor);
         let time = stopwatch.lap();
+        if monitor.cancelled() {
+            return Cow::Owned(log);
+        }
         // Made inside `get_or_init`, the log could wait for itself: its thread may take up another task of the pool in
         // the meantime.
         match self.surface_log.set(SurfaceLog { count, log, time }) {
-            Ok(()) => self.surface_log(primitives, recipe),
+            Ok(()) => self.surface_log(primitives, recipe, monitor),
             Err(made) => Cow::Owned(made.log),
         }
     }
@@ -175,17 +184,24 @@ impl BinaryStage {
         primitives: &Primitives,
         rays: &[Ray],
         recipe: &Recipe,
+        monitor: &dyn BuildMonitor,
     ) -> Cow<'_, TreeLog> {
         if rays.is_empty() || recipe.training.rays == TrainingRays::Surface {
-            return self.surface_log(primitives, recipe);
+            return self.surface_log(primitives, recipe, monitor);
         }
         let mut log = match recipe.training.rays {
             TrainingRays::Given => TreeLog::new(&self.tree),
             TrainingRays::Both | TrainingRays::Surface => {
-                self.surface_log(primitives, recipe).into_owned()
+                self.surface_log(primitives, recipe, monitor).into_owned()
             }
         };
-        log.add(primitives, &self.tree, rays, log.weight_for(rays));
+        log.add_until(
+            primitives,
+            &self.tree,
+            (rays, rays.len()),
+            log.weight_for(rays),
+            monitor,
+        );
         Cow::Owned(log)
     }
 
@@ -202,33 +218,36 @@ impl BinaryStage {
             tree: self.time,
             ..BuildTimes::default()
         };
-        let log =
-            (recipe.collapse.needs_log()).then(|| self.training_log(primitives, rays, recipe));
+        let log = (recipe.collapse.needs_log())
+            .then(|| self.training_log(primitives, rays, recipe, monitor));
         times.log = match (&log, self.surface_log.get()) {
             (Some(Cow::Borrowed(_)), Some(kept)) => kept.time,
             _ => Duration::ZERO,
         };
         times.log = stopwatch.lap().max(times.log);
         reached(0.6, monitor)?;
-        let mut bvh = self.collapse_for(primitives, log.as_deref(), !rays.is_empty(), recipe);
+        let thorough = !rays.is_empty();
+        let bvh = self.collapse_for(primitives, log.as_deref(), thorough, recipe, monitor);
+        let mut bvh = bvh.ok_or(Error::Cancelled)?;
         times.collapse = stopwatch.lap();
         bvh.times = recipe.clock.map(|_| times);
         Ok(bvh)
     }
 
-    /// [`Stage::collapse_for`].
+    /// [`Stage::collapse_for`]; `None` if the monitor stopped it.
     pub fn collapse_for(
         &self,
         primitives: &Primitives,
         log: Option<&TreeLog>,
         thorough: bool,
         recipe: &Recipe,
-    ) -> Bvh {
+        monitor: &dyn BuildMonitor,
+    ) -> Option<Bvh> {
         let Recipe {
             collapse, engine, ..
         } = *recipe;
         let Some(log) = log else {
-            return Bvh::collapse(primitives, &self.tree, collapse, engine);
+            return Some(Bvh::collapse(primitives, &self.tree, collapse, engine));
         };
         let learning = Learning {
             collapse,
@@ -236,7 +255,7 @@ impl BinaryStage {
             thorough,
             ..Learning::default()
         };
-        Bvh::collapse_logged(primitives, &self.tree, log, &learning, engine)
+        Bvh::collapse_until((primitives, &self.tree), log, &learning, engine, monitor)
     }
 
     /// [`Stage::learn`].
@@ -255,7 +274,8 @@ impl BinaryStage {
             true => Order::Sato,
             false => recipe.order,
         };
-        bvh.learn_order(&training, None, &recipe.order(order))?;
+        let given = rays.len().min(training.len());
+        bvh.learn_order_until((&training, given), None, &recipe.order(order), monitor)?;
         reached(0.95, monitor)?;
         monitor.progress(1.0);
         Ok(bvh)

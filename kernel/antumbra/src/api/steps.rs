@@ -8,7 +8,7 @@ use alloc::vec::Vec;
 
 use super::bvh::Bvh;
 use super::recipe::Recipe;
-use super::stage::Stage;
+use super::stage::{Stage, reached};
 use super::times::Stopwatch;
 use crate::builder::{self, Builder};
 use crate::collapse::{self, Collapse, Learning};
@@ -16,7 +16,9 @@ use crate::error::Error;
 use crate::geometry::primitives::Primitives;
 use crate::learn::log::Logging;
 use crate::learn::surface_rays::surface_rays;
+use crate::learn::tree_log::INSTANCE_ITEMS;
 use crate::learn::{Log, LogKind, TreeLog};
+use crate::monitor::BuildMonitor;
 use crate::order::{self, Order};
 use crate::ray::Ray;
 use crate::trace::engine::Engine;
@@ -86,6 +88,9 @@ pub trait Steps: Sized {
     fn apply(&mut self, order: &SlotOrder);
 
     /// Traces `rays` in this tree and returns their log. `seed` starts the shuffling of children, for kinds that shuffle.
+    ///
+    /// Rays may test 256 nodes each in the mean, ten times as many as in ordinary scenes, and one per two primitives besides.
+    /// Where they test more, as in a soup of triangles, some of them are left out, evenly over the list.
     fn log_of(&self, rays: &[Ray], kind: LogKind, seed: u64) -> Log;
 
     /// Puts a tree fresh from its collapse into the order of a recipe, learned from `log` or else from `rays`, and has it
@@ -153,13 +158,8 @@ impl Steps for Bvh {
         learning: &Learning,
         engine: Engine,
     ) -> Self {
-        tree.assert_is_of(primitives);
-        log.assert_fits(tree);
-        let (tree, cost) = collapse::by_log(primitives, tree, log, learning, engine.width());
-        Self {
-            predicted_cost: Some(cost),
-            ..Self::fresh(tree, engine, primitives)
-        }
+        Self::collapse_until((primitives, tree), log, learning, engine, &())
+            .expect("nobody stops it")
     }
 
     fn new_log(&self, kind: LogKind, seed: u64) -> Log {
@@ -188,11 +188,7 @@ impl Steps for Bvh {
     }
 
     fn log_of(&self, rays: &[Ray], kind: LogKind, seed: u64) -> Log {
-        let mut log = self.new_log(kind, seed);
-        let mut occluded = vec![false; rays.len()];
-        let mut costs = vec![Cost::default(); rays.len()];
-        self.occluded_batch_logged(rays, &mut occluded, &mut costs, &mut log);
-        log
+        self.log_until((rays, rays.len()), kind, seed, &())
     }
 
     fn learn_order(
@@ -201,44 +197,7 @@ impl Steps for Bvh {
         log: Option<&Log>,
         recipe: &Recipe,
     ) -> Result<Option<Log>, Error> {
-        let Recipe { order, costs, .. } = recipe;
-        self.prefetch = recipe.prefetch.or(self.prefetch);
-        if *order == Order::Simple {
-            // A fresh tree is in this order.
-            return Ok(None);
-        }
-        let mut stopwatch = Stopwatch::new(recipe.clock);
-        let mut times = self.times.unwrap_or_default();
-        let made = match (order.properties().log, log) {
-            (Some(kind), None) if !rays.is_empty() => {
-                Some(self.log_of(rays, kind, recipe.training.seed))
-            }
-            _ => None,
-        };
-        let log = log.or(made.as_ref());
-        times.order_log += stopwatch.lap();
-        if log.is_none() && order.learns() {
-            return Ok(None);
-        }
-        let plan = self.plan(*order, log, costs)?;
-        times.order += stopwatch.lap();
-        let predicted = match log {
-            Some(log) if !order.picks_by_ray() && log.kind().boxes => Some([
-                self.predicted_cost(log, costs, None)?,
-                self.predicted_cost(log, costs, Some(&plan))?,
-            ]),
-            _ => None,
-        };
-        times.predict += stopwatch.lap();
-        self.apply(&plan);
-        times.order += stopwatch.lap();
-        if let Some([before, after]) = predicted {
-            self.predicted_before = Some(before);
-            self.predicted_cost = Some(after);
-        }
-        self.training_rays = log.map_or(0, Log::rays);
-        self.times = recipe.clock.map(|_| times);
-        Ok(made)
+        self.learn_order_until((rays, rays.len()), log, recipe, &())
     }
 
     fn occluded_batch_counted(&self, rays: &[Ray], occluded: &mut [bool], costs: &mut [Cost]) {
@@ -268,6 +227,118 @@ impl Steps for Bvh {
         if let Some(masks) = log.masks_mut() {
             self.follow(rays, masks);
         }
+    }
+}
+
+/// Rays that are logged between two questions whether the build should stop.
+const LOGGED_AT_ONCE: usize = 8;
+/// Nodes that a log may test: whatever the tree, and per ray that was given.
+const LOGGED_NODES: [usize; 2] = [1 << 14, 256];
+
+impl Bvh {
+    /// [`Steps::collapse_logged`]; `None` if the monitor stopped it.
+    pub(super) fn collapse_until(
+        (primitives, tree): (&Primitives, &BinaryTree),
+        log: &TreeLog,
+        learning: &Learning,
+        engine: Engine,
+        monitor: &dyn BuildMonitor,
+    ) -> Option<Self> {
+        tree.assert_is_of(primitives);
+        log.assert_fits(tree);
+        let width = engine.width();
+        let (tree, cost) = collapse::by_log(primitives, tree, log, learning, width, monitor)?;
+        Some(Self {
+            predicted_cost: Some(cost),
+            ..Self::fresh(tree, engine, primitives)
+        })
+    }
+
+    /// [`Steps::log_of`] of rays, so many of which were given. Of fewer rays if the monitor stops it.
+    pub(crate) fn log_until(
+        &self,
+        (rays, given): (&[Ray], usize),
+        kind: LogKind,
+        seed: u64,
+        monitor: &dyn BuildMonitor,
+    ) -> Log {
+        let mut log = self.new_log(kind, seed);
+        let [least, per_ray] = LOGGED_NODES;
+        let items = self.primitives + INSTANCE_ITEMS * self.tree.instances.len();
+        let budget = (least + per_ray * given + items / 2) as f64;
+        let pieces = rays.len().div_ceil(LOGGED_AT_ONCE) as f64;
+        let mut tested = 0;
+        for (piece, rays) in rays.chunks(LOGGED_AT_ONCE).enumerate() {
+            // A quarter in advance, so that a few rays that test many nodes do no harm.
+            let allowed = budget * (0.25 + 0.75 * (piece + 1) as f64 / pieces);
+            if tested as f64 > allowed {
+                continue;
+            }
+            if monitor.cancelled() {
+                break;
+            }
+            let mut occluded = [false; LOGGED_AT_ONCE];
+            let mut costs = [Cost::default(); LOGGED_AT_ONCE];
+            let (occluded, costs) = (&mut occluded[..rays.len()], &mut costs[..rays.len()]);
+            let visits = |log: &Log| log.masks().map_or(0, |masks| masks.visits().len());
+            let before = visits(&log);
+            self.occluded_batch_logged(rays, occluded, costs, &mut log);
+            let nodes = costs.iter().map(|cost| cost.node_tests as usize);
+            tested += nodes.sum::<usize>() + visits(&log) - before;
+        }
+        log
+    }
+
+    /// [`Steps::learn_order`].
+    ///
+    /// # Errors
+    /// Besides, [`Error::Cancelled`] if the monitor stopped it.
+    pub(super) fn learn_order_until(
+        &mut self,
+        (rays, given): (&[Ray], usize),
+        log: Option<&Log>,
+        recipe: &Recipe,
+        monitor: &dyn BuildMonitor,
+    ) -> Result<Option<Log>, Error> {
+        let Recipe { order, costs, .. } = recipe;
+        self.prefetch = recipe.prefetch.or(self.prefetch);
+        if *order == Order::Simple {
+            // A fresh tree is in this order.
+            return Ok(None);
+        }
+        let mut stopwatch = Stopwatch::new(recipe.clock);
+        let mut times = self.times.unwrap_or_default();
+        let made = match (order.properties().log, log) {
+            (Some(kind), None) if !rays.is_empty() => {
+                Some(self.log_until((rays, given), kind, recipe.training.seed, monitor))
+            }
+            _ => None,
+        };
+        reached(0.9, monitor)?;
+        let log = log.or(made.as_ref());
+        times.order_log += stopwatch.lap();
+        if log.is_none() && order.learns() {
+            return Ok(None);
+        }
+        let plan = self.plan(*order, log, costs)?;
+        times.order += stopwatch.lap();
+        let predicted = match log {
+            Some(log) if !order.picks_by_ray() && log.kind().boxes => Some([
+                self.predicted_cost(log, costs, None)?,
+                self.predicted_cost(log, costs, Some(&plan))?,
+            ]),
+            _ => None,
+        };
+        times.predict += stopwatch.lap();
+        self.apply(&plan);
+        times.order += stopwatch.lap();
+        if let Some([before, after]) = predicted {
+            self.predicted_before = Some(before);
+            self.predicted_cost = Some(after);
+        }
+        self.training_rays = log.map_or(0, Log::rays);
+        self.times = recipe.clock.map(|_| times);
+        Ok(made)
     }
 }
 
@@ -305,7 +376,7 @@ impl Stage {
 
     /// Log of the training rays of a recipe in the binary tree.
     pub fn training_log(&self, rays: &[Ray], recipe: &Recipe) -> Cow<'_, TreeLog> {
-        self.binary.training_log(&self.primitives, rays, recipe)
+        (self.binary).training_log(&self.primitives, rays, recipe, &())
     }
 
     /// Wide tree for the rays of a training log, or without one for areas only. A thorough search for a learned
@@ -314,7 +385,9 @@ impl Stage {
     /// # Panics
     /// If the log was made for another tree.
     pub fn collapse_for(&self, log: Option<&TreeLog>, thorough: bool, recipe: &Recipe) -> Bvh {
-        (self.binary).collapse_for(&self.primitives, log, thorough, recipe)
+        (self.binary)
+            .collapse_for(&self.primitives, log, thorough, recipe, &())
+            .expect("nobody stops it")
     }
 }
 

@@ -105,8 +105,7 @@ pub trait Grow: Row {
 /// rays](Builder::needs_rays), all with the same weight; the others ignore them. Without rays, and where hardly any
 /// come, the result is the tree of [`Builder::BinnedSah`]. An object is built for the rays that enter its instances.
 ///
-/// The tree does not depend on the number of threads. If `monitor` stops the build, the tree is sound, but not the one
-/// that was requested.
+/// The tree does not depend on the number of threads. If `monitor` stops the build, the tree is of no use.
 pub(crate) fn build(
     primitives: &Primitives,
     builder: Builder,
@@ -124,7 +123,7 @@ pub(crate) fn build(
     let build_one = |primitives: &Primitives, place: usize| {
         improved(match grown.get(place) {
             Some(tree) => tree.clone(),
-            None => binned_sah::build(primitives),
+            None => binned_sah::build(primitives, monitor),
         })
     };
     if primitives.instances.is_empty() {

@@ -19,6 +19,7 @@ use crate::collapse::skeleton::{Contraction, Skeleton, Sorting};
 use crate::collapse::split_leaves::SplitLeaves;
 use crate::geometry::primitives::Primitives;
 use crate::learn::tree_log::TreeLog;
+use crate::monitor::{BuildMonitor, goes_on};
 use crate::parallel;
 use crate::tree::binary::{BinaryKind, BinaryTree};
 use crate::tree::costs::CostModel;
@@ -146,16 +147,18 @@ pub(crate) fn by_area(primitives: &Primitives, tree: &BinaryTree, width: Width) 
     layout::lay_out(&top, &objects, width)
 }
 
-/// Collapses by what is in a log of this tree. Returns the cost that equation (1) predicts, too.
+/// Collapses by what is in a log of this tree. Returns the cost that equation (1) predicts, too. `None` if the monitor stops
+/// it.
 pub(crate) fn by_log(
     primitives: &Primitives,
     tree: &BinaryTree,
     log: &TreeLog,
     learning: &Learning,
     width: Width,
-) -> (Tree, f64) {
+    monitor: &dyn BuildMonitor,
+) -> Option<(Tree, f64)> {
     if tree.nodes.is_empty() {
-        return (Tree::empty(width), f64::from(learning.model.node));
+        return Some((Tree::empty(width), f64::from(learning.model.node)));
     }
     let learning = &Learning {
         sort: learning.sort && learning.collapse.sorts(),
@@ -165,15 +168,31 @@ pub(crate) fn by_log(
     let learned = parallel::map(tree.objects.len(), 1, |object| {
         let (tree, log) = (&tree.objects[object], &log.objects[object]);
         if tree.nodes.is_empty() {
-            return (None, 0.0);
+            return Some((None, 0.0));
         }
         let primitives = &primitives.objects[object];
-        let (part, cost) = part(primitives, (tree, log), learning, &[], width.lanes());
-        (Some(part), cost)
+        let (part, cost) = part(
+            primitives,
+            (tree, log),
+            learning,
+            &[],
+            width.lanes(),
+            monitor,
+        )?;
+        Some((Some(part), cost))
     });
+    let learned = learned.into_iter().collect::<Option<Vec<_>>>()?;
     let (objects, costs): (Vec<_>, Vec<_>) = learned.into_iter().unzip();
-    let (top, cost) = part(primitives, (tree, log), learning, &costs, width.lanes());
-    (layout::lay_out(&top, &objects, width), cost)
+    let (top, cost) = part(
+        primitives,
+        (tree, log),
+        learning,
+        &costs,
+        width.lanes(),
+        monitor,
+    )?;
+    goes_on(monitor)?;
+    Some((layout::lay_out(&top, &objects, width), cost))
 }
 
 /// What is learned of a tree of at least one node, and the cost predicted. `objects` are the costs predicted for
@@ -184,7 +203,8 @@ fn part<'a>(
     learning: &Learning,
     objects: &[f64],
     width: usize,
-) -> (Part<'a>, f64) {
+    monitor: &dyn BuildMonitor,
+) -> Option<(Part<'a>, f64)> {
     let counts = &log.counts(tree);
     let sorting = Sorting {
         counts,
@@ -193,7 +213,7 @@ fn part<'a>(
         model: &learning.model,
         sort: learning.sort,
     };
-    let rays = Rays::new(tree, log, width);
+    let rays = Rays::new(tree, log, width, monitor);
     let sorted = |collapse: &dyn Contraction| Skeleton::sorted(tree, collapse, width, sorting);
     let whole = |skeleton| Part {
         primitives,
@@ -215,19 +235,19 @@ fn part<'a>(
                 && let Some(contraction) = other.contraction()
             {
                 let contract = |visits: &[f32]| contraction(tree, visits, width);
-                let visits = rays.visits(&contract, sorting, false);
+                let visits = rays.visits(&contract, sorting, false)?;
                 let (skeleton, cost) = sorted(&*contract(&visits));
-                return (whole(skeleton), cost);
+                return Some((whole(skeleton), cost));
             }
-            let visits = rays.visits(&rays.cheapest(), sorting, learning.thorough);
+            let visits = rays.visits(&rays.cheapest(), sorting, learning.thorough)?;
             // Of a log without rays nothing can be learned that is worth memory.
             if log.weight() > 0.0 {
-                return opened(primitives, sorting, &rays, &visits);
+                return Some(opened(primitives, sorting, &rays, &visits));
             }
             sorted(&CheapestCollapse::new(tree, &visits, width))
         }
     };
-    (whole(skeleton), cost)
+    Some((whole(skeleton), cost))
 }
 
 /// The learned collapse for rays that visit nodes so often, leaves being opened where that pays.
@@ -262,18 +282,25 @@ struct Rays<'a> {
     prior: AreaPrior,
     /// Children per node of the trees that they visit.
     width: usize,
+    monitor: &'a dyn BuildMonitor,
 }
 
 /// The contraction for rays that visit each binary node so often, see [`Contractor`].
 type ForVisits<'a> = dyn Fn(&[f32]) -> Box<dyn Contraction> + 'a;
 
 impl<'a> Rays<'a> {
-    fn new(tree: &'a BinaryTree, log: &'a TreeLog, width: usize) -> Self {
+    fn new(
+        tree: &'a BinaryTree,
+        log: &'a TreeLog,
+        width: usize,
+        monitor: &'a dyn BuildMonitor,
+    ) -> Self {
         Self {
             tree,
             log,
             prior: AreaPrior::new(tree, log.weight()),
             width,
+            monitor,
         }
     }
 
@@ -290,19 +317,29 @@ impl<'a> Rays<'a> {
     /// and keeps the result that costs the rays of the log less: on sponza, 8 wide, that saves up to 18 % of the node
     /// tests, elsewhere nothing to 2 %. Random starts promise more by the model than they keep (up to 4 % more node
     /// tests on sibenik).
-    fn visits(&self, contract: &ForVisits<'_>, sorting: Sorting, thorough: bool) -> Vec<f32> {
+    ///
+    /// `None` if the monitor stops the search.
+    fn visits(
+        &self,
+        contract: &ForVisits<'_>,
+        sorting: Sorting,
+        thorough: bool,
+    ) -> Option<Vec<f32>> {
+        goes_on(self.monitor)?;
         let from = |start: &[f32]| self.visits_if(contract, sorting, &self.with_prior(start));
         let first = from(&sorting.counts.entered).0;
+        goes_on(self.monitor)?;
         if !thorough || self.log.weight() == 0.0 {
-            return first;
+            return Some(first);
         }
         let second = from(&sorting.counts.hits).0;
+        goes_on(self.monitor)?;
         let cost = |visits: &[f32]| self.visits_if(contract, sorting, visits).1;
-        if cost(&second) < cost(&first) {
+        Some(if cost(&second) < cost(&first) {
             second
         } else {
             first
-        }
+        })
     }
 
     /// How many of them visit each node in the tree for rays that visit nodes so often, and what the rays of the log
@@ -408,7 +445,8 @@ mod tests {
                     sort: sort && collapse.sorts(),
                     ..Default::default()
                 };
-                let (part, _) = part(&primitives, (&tree, &log), &learning, &[], 8);
+                let (part, _) = part(&primitives, (&tree, &log), &learning, &[], 8, &())
+                    .expect("nobody stops it");
                 let (skeleton, own_tree) = (&part.skeleton, &part.tree);
                 // Of the tree with its leaves opened, if they are.
                 let mut own_log = TreeLog::new(own_tree);
@@ -447,9 +485,10 @@ mod tests {
                 model: &learning.model,
                 sort: true,
             };
-            let rays = Rays::new(&tree, &log, 8);
+            let rays = Rays::new(&tree, &log, 8, &());
             let [one, two] = [false, true].map(|thorough| {
                 let visits = rays.visits(&rays.cheapest(), sorting, thorough);
+                let visits = visits.expect("nobody stops it");
                 rays.visits_if(&rays.cheapest(), sorting, &visits).1
             });
             assert!(two <= one, "seed {seed}: {two}, {one} with one start");
@@ -459,7 +498,8 @@ mod tests {
                     thorough,
                     ..learning
                 };
-                let (part, _) = part(&primitives, (&tree, &log), &learning, &[], 8);
+                let (part, _) = part(&primitives, (&tree, &log), &learning, &[], 8, &())
+                    .expect("nobody stops it");
                 let nodes = part.skeleton.nodes.iter();
                 nodes.map(|node| node.binary).collect::<Vec<_>>()
             });
@@ -481,7 +521,9 @@ mod tests {
                 .map(|node| area(node.binary as usize))
                 .sum()
         };
-        let (learned, _) = part(&primitives, (&tree, &log), &Learning::default(), &[], 8);
+        let learning = Learning::default();
+        let (learned, _) =
+            part(&primitives, (&tree, &log), &learning, &[], 8, &()).expect("nobody stops it");
         assert!(area(&learned.skeleton) <= area(&Skeleton::new(&tree, &AreaCollapse, 8)));
     }
 
@@ -496,7 +538,8 @@ mod tests {
                 collapse,
                 ..Default::default()
             };
-            let (part, _) = part(&primitives, (&tree, &log), &learning, &[], 8);
+            let (part, _) =
+                part(&primitives, (&tree, &log), &learning, &[], 8, &()).expect("nobody stops it");
             let nodes = part.skeleton.nodes.iter();
             let area = |node: usize| f64::from(part.tree.nodes[node].bounds.half_area());
             nodes.map(|node| area(node.binary as usize)).sum()

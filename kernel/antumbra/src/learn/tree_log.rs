@@ -16,6 +16,7 @@ use crate::geometry::primitives::Primitives;
 use crate::geometry::ray_setup::RaySetup;
 use crate::learn::node_lists::NodeLists;
 use crate::learn::surface_rays::{default_count, surface_rays_within};
+use crate::monitor::BuildMonitor;
 use crate::parallel;
 use crate::ray::Ray;
 use crate::trace::binary::{Exhaustive, LeafHits, Witness};
@@ -35,13 +36,20 @@ const HIT_BYTES: usize = size_of::<u32>();
 const FREE_BYTES: [usize; 2] = [48 << 20, 32 << 20];
 /// Further bytes per node, primitive and instance of all trees.
 const BYTES_PER_ITEM: [usize; 2] = [16, 12];
+/// Bytes that bound the time of a call: whatever the scene, per node and primitive, and per ray that was given. Rays of
+/// ordinary scenes take a hundred bytes, in a forest of instances seven hundred, in a soup half a byte per triangle.
+const FAIR_BYTES: [usize; 3] = [256 << 10, 2, 2048];
+/// Primitives that an instance counts as where time is bounded: rays go into its object.
+pub(crate) const INSTANCE_ITEMS: usize = 32;
+/// Nodes that a task enters between two questions whether it should stop: about a millisecond.
+const NODES_PER_QUESTION: usize = 8192;
 
 /// Training log of a binary tree: the nodes that sample rays entered and the primitives that they hit.
 ///
 /// A few thousand rays are plenty. Each takes a hundred bytes or so until the log is dropped, seven hundred in a forest
 /// of instances.
-/// Rays through thousands of coincident primitives would take a thousand times as much. Fewer of them are kept then: see
-/// [`TreeLog::add`].
+/// Rays through thousands of overlapping primitives would take a thousand times as much. Fewer of them are followed then, so
+/// that learning takes a share of the time of the build whatever the scene: see [`TreeLog::add`].
 ///
 /// Partly transparent triangles are hit by the rays that they would stop, see [`crate::cutout::Opacity`].
 ///
@@ -61,10 +69,18 @@ pub struct TreeLog {
     pub(crate) objects: Vec<TreeLog>,
 }
 
+/// Bounds of a task, shared by the trees that its rays go through.
+struct Budget<'a> {
+    /// Bytes that may still be written.
+    left: Cell<usize>,
+    /// Nodes entered since the last query of the monitor.
+    unheard: Cell<usize>,
+    monitor: &'a dyn BuildMonitor,
+}
+
 /// Nodes that some rays entered in one binary tree, and primitives that they hit.
 struct Met<'a> {
-    /// Bytes that may still be written, shared by the trees that the rays go through.
-    left: &'a Cell<usize>,
+    budget: &'a Budget<'a>,
     /// Nodes that each ray entered. [`Met::HIT`] marks leaves of which a primitive was hit. Rays that cannot hit anything
     /// are left out.
     nodes: NodeLists,
@@ -80,9 +96,9 @@ impl<'a> Met<'a> {
     /// Leaves are at most 2³⁰, so node indices leave this bit free.
     const HIT: u32 = NodeLists::MARK;
 
-    fn new(left: &'a Cell<usize>) -> Self {
+    fn new(budget: &'a Budget<'a>) -> Self {
         Self {
-            left,
+            budget,
             nodes: NodeLists::default(),
             prims: Vec::new(),
             current: Vec::new(),
@@ -92,24 +108,39 @@ impl<'a> Met<'a> {
 }
 
 impl Witness for Met<'_> {
-    /// Refuses every ray once one did not fit.
+    /// Refuses every ray once one did not fit, or the build is cancelled.
     #[inline(always)]
     fn begin(&mut self, _ray: &RaySetup) -> bool {
+        let Budget {
+            left,
+            unheard,
+            monitor,
+        } = self.budget;
         self.current.clear();
         self.before = self.prims.len();
-        self.left.get() > 0
+        if unheard.get() >= NODES_PER_QUESTION {
+            unheard.set(0);
+            if monitor.cancelled() {
+                left.set(0);
+            }
+        }
+        left.get() > 0
     }
 
     #[inline(always)]
     fn node(&mut self, node: u32) {
-        if self.current.len() <= self.left.get() / NODE_BYTES {
-            self.current.push(node);
-        }
+        self.current.push(node);
+    }
+
+    /// Not if it cannot be kept.
+    #[inline(always)]
+    fn goes_on(&self) -> bool {
+        self.current.len() <= self.budget.left.get() / NODE_BYTES
     }
 
     #[inline(always)]
     fn hits(&mut self, _ray: &RaySetup, hits: LeafHits<'_>) {
-        if self.prims.len() - self.before > self.left.get() / HIT_BYTES {
+        if self.prims.len() - self.before > self.budget.left.get() / HIT_BYTES {
             return;
         }
         if let Some(leaf) = self.current.last_mut() {
@@ -125,15 +156,15 @@ impl Witness for Met<'_> {
     #[inline(always)]
     fn end(&mut self) {
         let prims = HIT_BYTES * (self.prims.len() - self.before);
-        let left = self.left.get();
-        match left.checked_sub(RAY_BYTES + NODE_BYTES * self.current.len() + prims) {
+        let Budget { left, unheard, .. } = self.budget;
+        unheard.set(unheard.get() + self.current.len());
+        match (left.get()).checked_sub(RAY_BYTES + NODE_BYTES * self.current.len() + prims) {
             Some(_) => {
                 let nodes = self.nodes.push(&self.current);
-                self.left
-                    .set(left.saturating_sub(RAY_BYTES + nodes + prims));
+                left.set(left.get().saturating_sub(RAY_BYTES + nodes + prims));
             }
             None => {
-                self.left.set(0);
+                left.set(0);
                 self.prims.truncate(self.before);
             }
         }
@@ -165,6 +196,16 @@ impl TreeLog {
     /// rays are not known yet. `None` is the number that suits its size: their cost stays in proportion to the cost of
     /// the build, and on five scenes 1000 rays give nearly the visits that 4000 do, 256 up to 25 % more.
     pub fn of_surfaces(primitives: &Primitives, tree: &BinaryTree, count: Option<usize>) -> Self {
+        Self::of_surfaces_until(primitives, tree, count, &())
+    }
+
+    /// [`TreeLog::of_surfaces`], of fewer rays if the monitor stops it.
+    pub(crate) fn of_surfaces_until(
+        primitives: &Primitives,
+        tree: &BinaryTree,
+        count: Option<usize>,
+        monitor: &dyn BuildMonitor,
+    ) -> Self {
         /// Any seed does; results must not depend on when or where they are computed.
         const SEED: u64 = 2016;
         let count = count.unwrap_or(default_count(primitives));
@@ -173,7 +214,7 @@ impl TreeLog {
             return log;
         };
         let rays = surface_rays_within(primitives, &root.bounds, count, SEED);
-        log.add(primitives, tree, &rays, count as f32);
+        log.add_until(primitives, tree, (&rays, 0), count as f32, monitor);
         log
     }
 
@@ -190,9 +231,12 @@ impl TreeLog {
     /// are blended: give each the weight of its share. Rays that cannot hit anything (see [`Ray`]) are
     /// left out.
     ///
-    /// A call takes at most 32 MiB and 12 bytes per node, primitive and instance of all trees. The whole log takes at most
-    /// 48 MiB and 16 bytes. Every task gets an equal part of what a call may take. The first ray that does not fit ends
-    /// its task, and the rays that are kept share the weight.
+    /// Memory bounds the time as well, since every node that a ray enters takes 2 bytes and every hit 4. A call takes at most
+    /// 256 KiB, 2 bytes per node and primitive of all trees, 64 per instance, and 2 KiB per ray. [Surface
+    /// rays](Self::of_surfaces) have no bytes of their own: in ordinary scenes they take a third of the others. However many
+    /// rays there are, a call takes at most 32 MiB and 12 bytes per node, primitive and instance, the whole log at most
+    /// 48 MiB and 16 bytes. Every task gets an equal part of what a call may take. The first ray that does not fit ends its
+    /// task, and the rays that are kept share the weight.
     ///
     /// Uses the rayon pool that is current, if the `parallel` feature is on; the log does not depend on
     /// the number of threads.
@@ -201,6 +245,18 @@ impl TreeLog {
     /// If the log was made for another tree, the tree was built over other primitives, or the weight is negative or not
     /// finite.
     pub fn add(&mut self, primitives: &Primitives, tree: &BinaryTree, rays: &[Ray], weight: f32) {
+        self.add_until(primitives, tree, (rays, rays.len()), weight, &());
+    }
+
+    /// [`TreeLog::add`] of rays, so many of which were given. Of fewer rays if the monitor stops it.
+    pub(crate) fn add_until(
+        &mut self,
+        primitives: &Primitives,
+        tree: &BinaryTree,
+        (rays, given): (&[Ray], usize),
+        weight: f32,
+        monitor: &dyn BuildMonitor,
+    ) {
         assert!(
             weight >= 0.0 && weight.is_finite(),
             "a weight of {weight} rays"
@@ -211,13 +267,18 @@ impl TreeLog {
             return;
         }
         let isa = Isa::best();
-        let chunk = CHUNK.max(rays.len().div_ceil(MAX_TASKS));
+        let (left, ray) = self.left(primitives, tree, given);
+        let chunk = CHUNK.max(rays.len().div_ceil(MAX_TASKS.min(left / ray).max(1)));
         let tasks = rays.len().div_ceil(chunk);
-        let share = self.left(tree) / tasks.max(1);
+        let share = left / tasks.max(1);
         let chunks = parallel::map(tasks, 1, |task| {
-            let left = Cell::new(share);
-            let mut world = Met::new(&left);
-            let mut objects: Vec<_> = tree.objects.iter().map(|_| Met::new(&left)).collect();
+            let budget = Budget {
+                left: Cell::new(share),
+                unheard: Cell::new(NODES_PER_QUESTION),
+                monitor,
+            };
+            let mut world = Met::new(&budget);
+            let mut objects: Vec<_> = tree.objects.iter().map(|_| Met::new(&budget)).collect();
             isa.dispatch(Exhaustive {
                 primitives,
                 tree,
@@ -255,14 +316,19 @@ impl TreeLog {
         }
     }
 
-    /// Bytes that a call of [`TreeLog::add`] may take.
-    fn left(&self, tree: &BinaryTree) -> usize {
+    /// Bytes that a call of [`TreeLog::add`] may take, if so many rays were given, and that one ray takes at the worst, but
+    /// for coincident primitives.
+    fn left(&self, primitives: &Primitives, tree: &BinaryTree, given: usize) -> (usize, usize) {
         let items = |tree: &BinaryTree| tree.nodes.len() + tree.prims.len();
         let items = items(tree) + tree.objects.iter().map(items).sum::<usize>();
         let [all, call] = [0, 1].map(|index| FREE_BYTES[index] + BYTES_PER_ITEM[index] * items);
         let bytes = |log: &Self| RAY_BYTES * log.weights.len() + log.met.bytes();
         let taken = bytes(self) + self.objects.iter().map(bytes).sum::<usize>();
-        call.min(all.saturating_sub(taken))
+        let [least, per_item, per_given] = FAIR_BYTES;
+        let entered = INSTANCE_ITEMS * primitives.instances.len();
+        let fair = least + per_item * (items + entered) + per_given * given;
+        let left = fair.min(call).min(all.saturating_sub(taken));
+        (left, items * 2 / 3 + 1)
     }
 
     /// Rays logged so far, without those that cannot hit anything.
@@ -372,10 +438,13 @@ mod tests {
     use alloc::format;
 
     use super::*;
+    use crate::Recipe;
     use crate::builder::Builder;
     use crate::geometry::slab_test::hits_box;
     use crate::geometry::test_primitives::primitives;
     use crate::geometry::{Geometry, Instance, QueryKind};
+    use crate::learn::LogKind;
+    use crate::parts::Steps;
     use antumbra_testkit::{Rng, mesh, rays};
 
     fn kernel_rays(rng: &mut Rng, mesh: &mesh::Mesh, count: usize) -> Vec<Ray> {
@@ -576,6 +645,71 @@ mod tests {
         assert!((blend.counts(&tree).entered[0] - 128.0).abs() < 1e-3);
     }
 
+    /// Every ray through a soup comes to a good part of all nodes. So few of them are followed that the nodes that they
+    /// enter are in proportion to the primitives. Of a surface nothing is left out.
+    #[test]
+    fn learning_from_a_soup_is_bounded() {
+        let mut rng = Rng::new(33);
+        let soup: Vec<_> = (0..8000)
+            .map(|_| [(); 3].map(|()| rng.point(1.0)))
+            .collect();
+        let soup = (
+            soup.concat(),
+            (0..8000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+        );
+        let grid = mesh::bumpy_grid(&mut rng, 8000);
+        let grid: (Vec<_>, Vec<_>) = (grid.positions, grid.indices);
+        for (name, (positions, indices), is_bounded) in
+            [("soup", soup, true), ("grid", grid, false)]
+        {
+            let geometry = [Geometry::triangles(&positions[..], &indices[..])];
+            let primitives = Primitives::new(&geometry).expect("indices in range");
+            let stage = crate::Build::new(&primitives).stage().expect("a stage");
+            let tree = stage.tree();
+            let rays = default_count(&primitives);
+            let log = TreeLog::of_surfaces(&primitives, tree, None);
+            let items = tree.nodes.len() + tree.prims.len();
+            let bytes = log.met.bytes()
+                + HIT_BYTES * log.prim_hits.iter().filter(|hits| **hits > 0.0).count();
+            assert!(bytes < (256 << 10) + 2 * items, "{name}: {bytes} bytes");
+            assert_eq!(
+                log.rays() < rays,
+                is_bounded,
+                "{name}: {} of {rays}",
+                log.rays()
+            );
+            assert!(
+                log.rays() > 8 && (log.weight() - rays as f32).abs() < 0.1,
+                "{name}"
+            );
+
+            let bvh = stage.learn(&[], &Recipe::default(), &()).expect("a tree");
+            let learned = bvh.report().training_rays;
+            assert_eq!(
+                learned < rays as u64,
+                is_bounded,
+                "{name}: {learned} of {rays}"
+            );
+            let surface = surface_rays_within(&primitives, &primitives.bounds(), rays, 7);
+            let kind = LogKind {
+                boxes: true,
+                shuffled: true,
+                masks: true,
+            };
+            let log = bvh.log_until((&surface, 0), kind, 1, &());
+            let visits = log.masks().map_or(0, |masks| masks.visits().len());
+            // What is tested before it is known that it was too much: the rays logged at once.
+            let most = (16 << 10) + primitives.len() / 2 + 8 * bvh.report().nodes;
+            assert!(visits < most, "{name}: {visits} of {most}");
+            let all = bvh.log_of(&surface, kind, 1);
+            assert_eq!(
+                all.rays(),
+                rays as u64,
+                "{name}: given rays have budgets of their own"
+            );
+        }
+    }
+
     /// Rays through coincident triangles enter all leaves. The log keeps as many rays as it has room for, however many
     /// threads there are, and the rays that it keeps have the weight of all.
     #[test]
@@ -588,7 +722,7 @@ mod tests {
         let ray = |index: usize| Ray::new([0.1, 0.1, 1.0 + index as f32], [0.0, 0.0, -1.0]);
         let rays: Vec<_> = (0..2000).map(ray).collect();
         let mut log = TreeLog::new(&tree);
-        let room = log.left(&tree);
+        let (room, _) = log.left(&primitives, &tree, rays.len());
         log.add(&primitives, &tree, &rays, 2000.0);
         let kept = log.rays();
         assert!((16..1000).contains(&kept), "{kept} rays");

@@ -26,6 +26,11 @@ pub trait Witness {
     /// its box: no traversal tests that.
     fn node(&mut self, node: u32);
 
+    /// Whether the ray goes on, queried at every node. One that does not is at its end. Default: it does.
+    fn goes_on(&self) -> bool {
+        true
+    }
+
     /// The node entered last is a leaf, and the ray hits something in it.
     fn hits(&mut self, ray: &RaySetup, hits: LeafHits<'_>);
 
@@ -208,6 +213,10 @@ impl<'a, W: Witness> Follower<'a, W> {
         stack.push(0);
         while let Some(index) = stack.pop() {
             witness.node(index as u32);
+            if !witness.goes_on() {
+                stack.clear();
+                break;
+            }
             match tree.nodes[index].kind {
                 BinaryKind::Inner { right } => {
                     let (left, right) = (index + 1, index + right as usize);

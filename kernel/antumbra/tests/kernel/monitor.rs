@@ -35,6 +35,18 @@ impl BuildMonitor for Patient {
     }
 }
 
+/// Stops a build at one question, and takes it back at the next.
+struct Once {
+    asked: AtomicUsize,
+    which: usize,
+}
+
+impl BuildMonitor for Once {
+    fn cancelled(&self) -> bool {
+        self.asked.fetch_add(1, Ordering::Relaxed) == self.which
+    }
+}
+
 /// A build can be stopped wherever it asks, and one that is not stopped is what it always is.
 #[test]
 fn builds_stop_wherever_they_ask() {
@@ -71,6 +83,27 @@ fn builds_stop_wherever_they_ask() {
                 .bvh();
             assert_eq!(stopped.err(), Some(Error::Cancelled), "{preset} {most}");
         }
+    }
+    // Once stopped, always stopped: what was left undone does not become a tree.
+    let recipe = Recipe::default();
+    for which in 0..12 {
+        let monitor = Once {
+            asked: AtomicUsize::new(0),
+            which,
+        };
+        let stopped = Build::new(&list).recipe(&recipe).monitor(&monitor).bvh();
+        assert_eq!(stopped.err(), Some(Error::Cancelled), "question {which}");
+        let stage = Build::new(&list).stage().expect("not stopped");
+        monitor.asked.store(0, Ordering::Relaxed);
+        let stopped = stage.learn(&rays, &recipe, &monitor);
+        assert_eq!(stopped.err(), Some(Error::Cancelled), "question {which}");
+        let learned = stage.learn(&[], &recipe, &()).expect("not stopped");
+        let expected = Bvh::build(&list, &recipe).expect("in range");
+        assert_eq!(
+            learned.report(),
+            expected.report(),
+            "a log that was stopped is not kept"
+        );
     }
     let stop = AtomicBool::new(true);
     let stopped = Build::new(&list)

@@ -23,6 +23,7 @@ use crate::builder::binned_sah::sweep::{MAX_SWEEP, sweep};
 use crate::builder::cost::{Cost, Weigh};
 use crate::geometry::BLOCK;
 use crate::geometry::primitives::{PrimKind, Primitives};
+use crate::monitor::BuildMonitor;
 use crate::parallel::{chunk_len, concat, fill, for_each, join, map};
 use crate::tree::binary::{BinaryKind, BinaryNode, BinaryTree};
 
@@ -37,9 +38,9 @@ const SEQUENTIAL: usize = 4096;
 const MANY_BINS: usize = 32;
 const SOME_BINS: usize = 16;
 
-/// Builds the tree.
-pub(crate) fn build(primitives: &Primitives) -> BinaryTree {
-    build_on(primitives, Isa::best())
+/// Builds the tree. If `monitor` stops it, some leaves have too many primitives.
+pub(crate) fn build(primitives: &Primitives, monitor: &dyn BuildMonitor) -> BinaryTree {
+    build_on(primitives, Isa::best(), monitor)
 }
 
 /// The subtree of [`Builder::BinnedSah`](crate::recipe::Builder) over some of the primitives, which are named by their
@@ -59,7 +60,7 @@ pub fn subtree(primitives: &Primitives, prims: &[u32], depth: u32) -> BinaryTree
         depth,
         extent: Dispatch::<8>::dispatch(isa, Measure(&items)),
     };
-    let plan = Plan::new(primitives, isa, SEQUENTIAL);
+    let plan = Plan::new(primitives, isa, SEQUENTIAL, &());
     BinaryTree {
         nodes: concat(plan.build(&mut items, root)),
         prims: items.iter().map(Planes::index).collect(),
@@ -68,7 +69,7 @@ pub fn subtree(primitives: &Primitives, prims: &[u32], depth: u32) -> BinaryTree
 }
 
 /// Builds the tree on an instruction set, which makes no difference to it.
-fn build_on(primitives: &Primitives, isa: Isa) -> BinaryTree {
+fn build_on(primitives: &Primitives, isa: Isa, monitor: &dyn BuildMonitor) -> BinaryTree {
     let count = primitives.len();
     if count == 0 {
         return BinaryTree::default();
@@ -88,7 +89,7 @@ fn build_on(primitives: &Primitives, isa: Isa) -> BinaryTree {
     });
     let extent = extent.iter().fold(Extent::EMPTY, |all, one| all.union(one));
 
-    let plan = Plan::new(primitives, isa, SEQUENTIAL.max(count / 64));
+    let plan = Plan::new(primitives, isa, SEQUENTIAL.max(count / 64), monitor);
     let root = Part {
         first: 0,
         count,
@@ -165,7 +166,8 @@ impl Part {
 }
 
 /// Constants of the whole tree.
-struct Plan {
+struct Plan<'a> {
+    monitor: &'a dyn BuildMonitor,
     isa: Isa,
     /// Parts of at most this many primitives are the work of one thread.
     sequential: usize,
@@ -174,9 +176,15 @@ struct Plan {
     cost: Cost,
 }
 
-impl Plan {
-    fn new(primitives: &Primitives, isa: Isa, sequential: usize) -> Self {
+impl<'a> Plan<'a> {
+    fn new(
+        primitives: &Primitives,
+        isa: Isa,
+        sequential: usize,
+        monitor: &'a dyn BuildMonitor,
+    ) -> Self {
         Self {
+            monitor,
             isa,
             sequential,
             kinds: primitives
@@ -196,6 +204,12 @@ impl Plan {
     /// The subtree over `items`, in pieces that are to follow each other: children are found by relative places, so
     /// they can be moved as they are.
     fn build(&self, items: &mut [Planes], part: Part) -> Vec<Vec<BinaryNode>> {
+        if self.monitor.cancelled() {
+            let bounds = part.extent.bounds.bounds();
+            let (first, count) = (part.first as u32, part.count as u32);
+            let kind = BinaryKind::Leaf { first, count };
+            return vec![vec![BinaryNode { bounds, kind }]];
+        }
         if part.count <= self.sequential {
             let subtree = Subtree {
                 plan: self,
@@ -325,7 +339,7 @@ fn halve<S: Simd, W: Weigh>(simd: S, items: &mut [Planes], part: &Part) -> [Part
 
 /// A subtree for one thread.
 struct Subtree<'a> {
-    plan: &'a Plan,
+    plan: &'a Plan<'a>,
     items: &'a mut [Planes],
     part: Part,
 }

@@ -55,7 +55,7 @@ fn trees_are_valid_and_complete() {
             for spheres in [0, 3, size] {
                 let mesh = generate(&mut rng, size);
                 let primitives = primitives(&mesh, spheres, &mut rng);
-                let tree = build(&primitives);
+                let tree = build(&primitives, &());
                 if primitives.is_empty() {
                     assert_eq!(tree.node_count(), 0);
                     continue;
@@ -83,7 +83,7 @@ fn levels_and_threads_make_no_difference() {
                 for &threads in &threads {
                     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
                     let pool = pool.build().expect("threads");
-                    let tree = pool.install(|| build_on(&primitives, isa));
+                    let tree = pool.install(|| build_on(&primitives, isa, &()));
                     let mut seen = vec![0; primitives.len()];
                     check(&primitives, &tree, 0, &mut seen);
                     let found = format!("{tree:?}");
@@ -146,7 +146,7 @@ fn the_tree_is_about_as_good_as_with_all_splits() {
             .map(|prim| primitives.bounds_of(prim))
             .collect();
         let mut prims: Vec<usize> = (0..bounds.len()).collect();
-        let tree = build(&primitives);
+        let tree = build(&primitives, &());
         let root = f64::from(tree.nodes[0].bounds.half_area());
         let areas = tree.nodes.iter().map(|node| node.bounds.half_area());
         let this = areas.map(f64::from).sum::<f64>() / root;

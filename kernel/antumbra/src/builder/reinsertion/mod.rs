@@ -32,8 +32,15 @@ const MIN_GAIN: f64 = 0.001;
 /// cross each other the number would grow with the scene.
 const MAX_VISITS: usize = 64;
 
+/// No further round begins when all searches together have looked at more inner nodes than this times the nodes there are.
+/// Interiors and cities need 23 to 61 in all rounds. In a soup of triangles a round takes 62, and the third gains 0.4 %.
+const MEAN_VISITS: usize = 100;
+
 /// No move takes a node further from the root than this, which is the bound that binned SAH keeps.
 const MAX_DEPTH: usize = 94;
+
+/// Moves between two questions whether to stop: some milliseconds.
+const MOVES_PER_QUESTION: usize = 4096;
 
 /// Subtrees for which a thread searches places at one go.
 const CHUNK: usize = 256;
@@ -45,19 +52,28 @@ pub(crate) fn improved(tree: &BinaryTree, monitor: &dyn BuildMonitor) -> BinaryT
     }
     let mut linked = LinkedTree::new(tree);
     let mut sum: f64 = tree.nodes.iter().map(|node| area(&node.bounds)).sum();
+    let mut visits = 0;
     for _ in 0..MAX_ROUNDS {
         let mut gain = 0.0;
-        for Move { node, to, .. } in moves(&linked, monitor) {
-            gain += linked.reinsert(node, to, MAX_DEPTH);
+        let (moves, looked_at) = moves(&linked, monitor);
+        visits += looked_at;
+        for moves in moves.chunks(MOVES_PER_QUESTION) {
+            if monitor.cancelled() {
+                break;
+            }
+            for &Move { node, to, .. } in moves {
+                gain += linked.reinsert(node, to, MAX_DEPTH);
+            }
         }
         sum -= gain;
-        if gain <= MIN_GAIN * sum || monitor.cancelled() {
+        if gain <= MIN_GAIN * sum || visits > MEAN_VISITS * linked.len() || monitor.cancelled() {
             break;
         }
     }
     linked.unlinked(&tree.prims)
 }
 
+#[derive(Clone, Copy)]
 /// A subtree that would be better next to another node.
 struct Move {
     node: u32,
@@ -66,21 +82,28 @@ struct Move {
     gain: f32,
 }
 
-/// The best move of every subtree that has one, those that gain most first.
-fn moves(tree: &LinkedTree, monitor: &dyn BuildMonitor) -> Vec<Move> {
+/// The best move of every subtree that has one, those that gain most first, and how many inner nodes the searches looked at.
+fn moves(tree: &LinkedTree, monitor: &dyn BuildMonitor) -> (Vec<Move>, usize) {
     let found = parallel::map(tree.len().div_ceil(CHUNK), 1, |chunk| {
         if monitor.cancelled() {
-            return Vec::new();
+            return (Vec::new(), 0);
         }
         let first = 1 + chunk * CHUNK;
-        let mut open = Vec::new();
-        (first..=tree.len().min(first + CHUNK - 1))
-            .filter_map(|node| Search::new(tree, node as u32, &mut open).best())
-            .collect::<Vec<_>>()
+        let (mut open, mut moves, mut visits) = (Vec::new(), Vec::new(), 0);
+        for node in first..=tree.len().min(first + CHUNK - 1) {
+            let mut search = Search::new(tree, node as u32, &mut open);
+            search.search();
+            visits += MAX_VISITS - search.visits;
+            if search.best.gain > 0.0 {
+                moves.push(search.best);
+            }
+        }
+        (moves, visits)
     });
-    let mut moves: Vec<_> = found.into_iter().flatten().collect();
+    let visits = found.iter().map(|(_, visits)| visits).sum();
+    let mut moves: Vec<_> = found.into_iter().flat_map(|(moves, _)| moves).collect();
     moves.sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.node.cmp(&b.node)));
-    moves
+    (moves, visits)
 }
 
 /// Looks for the best place of a subtree, by branch and bound. In single precision: what is gained in truth
@@ -115,11 +138,11 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// The best move; `None` if the subtree is best where it is.
+    /// Finds the best move. It gains nothing if the subtree is best where it is.
     ///
     /// The way to a new place goes up to some node and down on its other side. Nodes on the way up shrink,
     /// those on the way down grow, and all others stay as they are.
-    fn best(mut self) -> Option<Move> {
+    fn search(&mut self) {
         let tree = self.tree;
         let node = self.best.node;
         let (mut below, mut pivot) = (node, tree.parent(node));
@@ -144,7 +167,6 @@ impl<'a> Search<'a> {
             }
             (below, pivot) = (pivot, tree.parent(pivot));
         }
-        (self.best.gain > 0.0).then_some(self.best)
     }
 
     /// Considers all places that are still open.

@@ -67,7 +67,7 @@ fn sum_of_areas(tree: &BinaryTree) -> f64 {
 /// Checks all that is promised of an improved tree, and returns the sum of its areas as a share of what it
 /// was before.
 fn check_improved(primitives: &Primitives, place: &str) -> f64 {
-    let before = binned_sah::build(primitives);
+    let before = binned_sah::build(primitives, &());
     let after = improved(&before, &());
     assert_eq!(leaves(&before), leaves(&after), "{place}");
     if before.nodes.is_empty() {
@@ -134,7 +134,7 @@ fn threads_make_no_difference() {
             let pool = pool.build().expect("threads");
             format!(
                 "{:?}",
-                pool.install(|| improved(&binned_sah::build(&primitives), &()))
+                pool.install(|| improved(&binned_sah::build(&primitives, &()), &()))
             )
         });
         assert!(
@@ -149,7 +149,7 @@ fn threads_make_no_difference() {
 fn small_tree(seed: u64) -> BinaryTree {
     let mut rng = Rng::new(seed);
     let mesh = mesh::soup(&mut rng, 150);
-    binned_sah::build(&primitives(&mesh, 5, &mut rng))
+    binned_sah::build(&primitives(&mesh, 5, &mut rng), &())
 }
 
 #[test]
@@ -186,8 +186,10 @@ fn searches_find_the_best_place() {
                 refused += usize::from(same_depth < gain);
                 assert!(height(&shallow.unlinked(&tree.prims)) <= height_before);
             }
-            let best = Search::new(&linked, node, &mut Vec::new()).best();
-            let gain = best.map_or(0.0, |best| f64::from(best.gain));
+            let mut open = Vec::new();
+            let mut search = Search::new(&linked, node, &mut open);
+            search.search();
+            let gain = f64::from(search.best.gain);
             assert!(
                 (gain - most).abs() < 1e-5 * before,
                 "seed {seed}: {gain} {most}"
