@@ -24,7 +24,11 @@ fn hills([width, height]: [usize; 2], transform: [f64; 6], holes: f64, rng: &mut
     let values = values.collect();
     let mut grid = Grid::north_up([width, height], [0.0; 2], 1.0);
     grid.transform = transform;
-    Raster { grid, values }
+    Raster {
+        grid,
+        values,
+        height_factor: None,
+    }
 }
 
 /// Largest slope of all edges of all triangles of the raster's mesh on the way from an eye along an azimuth.

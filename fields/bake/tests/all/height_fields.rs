@@ -38,7 +38,11 @@ fn hills([width, height]: [usize; 2], transform: [f64; 6], holes: f64, seed: u64
     let values = values.collect();
     let mut grid = Grid::north_up([width, height], [0.0; 2], 1.0);
     grid.transform = transform;
-    Raster { grid, values }
+    Raster {
+        grid,
+        values,
+        height_factor: None,
+    }
 }
 
 /// A surface as triangles: places as columns and rows, and heights.

@@ -22,6 +22,7 @@ impl Terrain {
             raster: Raster {
                 grid: Grid::north_up([size, size], [-half, half], cell),
                 values: cells.collect(),
+                height_factor: None,
             },
             cell,
             curvature: Curvature::new(EARTH_RADIUS, refraction, [0.0; 3], Orientation::default())
