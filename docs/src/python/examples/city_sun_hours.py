@@ -38,7 +38,7 @@ for month in (6, 12):
     midnight = datetime(2025, month, 21)
     times = [midnight + (step + 0.5) * STEP for step in range(24 * 6)]
     sun = am.sun_positions(*ROME[:2], times, ROME[2])
-    hours = scene.sun_hours(sensors, np.broadcast_to([0, 0, 1], sensors.shape), sun.direction[sun.up], STEP.seconds / 3600)
+    hours = scene.sun_hours(sensors, np.broadcast_to([0, 0, 1], sensors.shape), sun)
     open_ground = hours[~inside]
     print(f"21.{month}.: {sun.up.sum() * STEP.seconds / 3600:.1f} h of sun, {open_ground.mean():.1f} h on the ground")
     pictures.append(am.heat_map(np.where(inside, np.nan, hours), 0, 15).pixels)
