@@ -13,6 +13,7 @@ use antumbra_load::{
     Diagnostic, Extent, Heights, Loaded, MemorySize, Options, Severity, Sky, Stage, Up, Upright,
     check_picture,
 };
+use antumbra_raster::{Crs, unit_name};
 use antumbra_render::{Camera, World};
 use antumbra_scene::{Image, Pixels, Projection, Sampler, Scene};
 use antumbra_trees::ORDERS;
@@ -372,8 +373,10 @@ pub fn tell_read(loaded: &Loaded, asked: Option<Up>) {
         [0.0, 0.0, 0.0] => String::new(),
         [x, y, z] => format!("; measured from {x} {y} {z}"),
     };
+    let raster = loaded.raster.as_ref();
+    let unit = unit(raster.and_then(|raster| raster.grid.crs.as_ref()));
     tell(format_args!(
-        "{}: {x} x {y} x {z} units (x, y, z); {} is up, {}; {} triangles{place}",
+        "{}: {x} x {y} x {z} {unit} (x, y, z); {} is up, {}; {} triangles{place}",
         scene.name,
         up.axis,
         up.reason,
@@ -385,6 +388,12 @@ pub fn tell_read(loaded: &Loaded, asked: Option<Up>) {
             scene.name
         ));
     }
+}
+
+/// Name of the unit of a coordinate system.
+pub fn unit(crs: Option<&Crs>) -> String {
+    crs.and_then(Crs::metres)
+        .map_or("units".to_owned(), unit_name)
 }
 
 /// A length with four digits.

@@ -2,13 +2,14 @@
 
 use antumbra::recipe::Builder;
 use antumbra_bake::{Moment, Orientation, Place, Refraction, UpAxis, sun_positions};
-use antumbra_load::{MemorySize, Up};
+use antumbra_load::{Loaded, MemorySize, Up};
 use antumbra_render::{Options, World};
 use antumbra_scene::Scene;
 use antumbra_view::{Server, Sun, SunDay};
 
 use crate::args::ViewArgs;
 use crate::bake::map;
+use crate::bake::site::Asked;
 use crate::exit::{Failure, print, tell};
 use crate::{interrupt, scenes};
 
@@ -53,7 +54,7 @@ fn ready(
 ) -> Result<(Scene, World, Option<SunDay>), Failure> {
     let mut loaded = scenes::load_one(&args.scene, &args.picture, memory)?;
     scenes::apply_camera(&mut loaded, &args.camera)?;
-    let day = args.day.map(|date| sun_day(args, &date, loaded.up.axis));
+    let day = args.day.map(|date| sun_day(args, &date, &loaded));
     let day = day.transpose()?;
     let scene = loaded.scene;
     server.tell("building the first tree");
@@ -66,8 +67,8 @@ fn ready(
 const STEP: u32 = 5;
 
 /// The suns of a day at the place of the command line.
-fn sun_day(args: &ViewArgs, date: &Moment, up: Up) -> Result<SunDay, Failure> {
-    let up = match up {
+fn sun_day(args: &ViewArgs, date: &Moment, loaded: &Loaded) -> Result<SunDay, Failure> {
+    let up = match loaded.up.axis {
         Up::Y => UpAxis::Y,
         Up::Z => UpAxis::Z,
         axis => {
@@ -75,6 +76,12 @@ fn sun_day(args: &ViewArgs, date: &Moment, up: Up) -> Result<SunDay, Failure> {
             return Err(Failure::Usage(reason));
         }
     };
+    let asked = Asked {
+        crs: None,
+        units: None,
+        north: Some(&args.north),
+    };
+    asked.of(loaded, up)?;
     // Both are required beside the date.
     let [latitude, longitude] = [args.lat, args.lon].map(Option::unwrap_or_default);
     let place = Place {
@@ -98,7 +105,7 @@ fn sun_day(args: &ViewArgs, date: &Moment, up: Up) -> Result<SunDay, Failure> {
         .map(|step| midnight.unix(zone) + 3600.0 * hour(step))
         .collect();
     let positions = sun_positions(&place, Refraction::default(), &times).map_err(Failure::usage)?;
-    let orientation = Orientation::new(up, args.north).map_err(Failure::usage)?;
+    let orientation = Orientation::new(up, args.north.degrees()).map_err(Failure::usage)?;
     let suns = (0..).zip(&positions).map(|(step, sun)| Sun {
         hour: hour(step),
         azimuth: sun.azimuth,

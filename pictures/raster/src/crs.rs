@@ -264,9 +264,9 @@ impl Site {
         ((scale - 1.0).abs() > Self::MOST_STRETCH).then_some(scale)
     }
 
-    /// The command that projects a raster to metres on the ground.
-    pub fn remedy(&self) -> String {
-        remedy(self.latitude, self.longitude)
+    /// The system of EPSG with the zone of UTM that the place is in.
+    pub fn utm(&self) -> String {
+        utm(self.latitude, self.longitude)
     }
 
     /// Kilometres along the ground to another place.
@@ -279,8 +279,8 @@ impl Site {
     }
 }
 
-/// The command that projects a raster to the zone of UTM of a place, or to the polar system.
-pub(crate) fn remedy(latitude: f64, longitude: f64) -> String {
+/// The system with the zone of UTM of a place, or of a pole.
+pub(crate) fn utm(latitude: f64, longitude: f64) -> String {
     let zone = 1 + ((longitude + 180.0).rem_euclid(360.0) / 6.0) as u32;
     let code = match latitude {
         ..-80.0 => 32_761,
@@ -288,7 +288,7 @@ pub(crate) fn remedy(latitude: f64, longitude: f64) -> String {
         84.0.. => 32_661,
         _ => 32_600 + zone,
     };
-    format!("gdalwarp -t_srs EPSG:{code} in.tif out.tif")
+    format!("EPSG:{code}")
 }
 
 /// A projection without grids of its datum, which are files that are not there, and move a place by 200 m at most.
@@ -627,25 +627,16 @@ mod tests {
             (scale * munich.latitude.to_radians().cos() - 1.0).abs() < 4e-3,
             "{scale}"
         );
-        assert_eq!(munich.remedy(), "gdalwarp -t_srs EPSG:32632 in.tif out.tif");
+        assert_eq!(munich.utm(), "EPSG:32632");
         assert_eq!(
             web.site([4_000_000.0, -100_000.0])
                 .expect("a place")
                 .stretch(),
             None
         );
-        assert_eq!(
-            remedy(-33.9, 151.2),
-            "gdalwarp -t_srs EPSG:32756 in.tif out.tif"
-        );
-        assert_eq!(
-            remedy(40.0, -105.3),
-            "gdalwarp -t_srs EPSG:32613 in.tif out.tif"
-        );
-        assert_eq!(
-            remedy(-85.0, 0.0),
-            "gdalwarp -t_srs EPSG:32761 in.tif out.tif"
-        );
+        assert_eq!(utm(-33.9, 151.2), "EPSG:32756");
+        assert_eq!(utm(40.0, -105.3), "EPSG:32613");
+        assert_eq!(utm(-85.0, 0.0), "EPSG:32761");
     }
 
     #[test]

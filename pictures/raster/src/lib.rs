@@ -130,18 +130,20 @@ pub fn read(path: &Path, max_bytes: u64) -> Result<Raster, Error> {
         return Ok(raster);
     };
     if crs.is_geographic() {
-        let remedy = crs::remedy(middle[1], middle[0]);
+        let utm = crs::utm(middle[1], middle[0]);
         return Err(broken(format!(
-            "its coordinates are degrees, in which cells have no length; project it to metres first, as with {remedy}"
+            "its coordinates are degrees, in which cells have no length; project it to metres first, as with \
+             gdalwarp -t_srs {utm} in.tif out.tif"
         )));
     }
     let site = crs.site(middle);
     if let Some((site, scale)) = site.and_then(|site| Some((site, site.stretch()?))) {
         return Err(broken(format!(
-            "lengths in {} are {scale:.3} times as long as on the ground at {:.2} degrees of latitude; project it first, as with {}",
+            "lengths in {} are {scale:.3} times as long as on the ground at {:.2} degrees of latitude; project it first, as with \
+             gdalwarp -t_srs {} in.tif out.tif",
             crs.name(),
             site.latitude,
-            site.remedy()
+            site.utm()
         )));
     }
     Ok(raster)

@@ -60,7 +60,7 @@ pub use merge::MergeArgs;
 pub use picture::PictureArgs;
 pub use raster::RasterArgs;
 pub use render::{RenderArgs, UntilArgs};
-pub use sensors::PlaceArgs;
+pub use sensors::{NorthArgs, PlaceArgs, UnitArgs};
 pub use slips::parse;
 pub use study::StudyArgs;
 pub use sun::{By, Shown, SunArgs};

@@ -9,9 +9,10 @@ use super::heading;
 #[derive(Debug, Args)]
 #[command(next_help_heading = heading::OUTPUT)]
 pub struct RasterArgs {
-    /// Coordinate system of a .tif, as EPSG:25832
+    /// Coordinate system of the scene, as EPSG:25832
     ///
-    /// If absent: the one of a scene that is a GeoTIFF, or none. Coordinates are not changed.
+    /// If absent: the one of a scene that is a GeoTIFF, or none. Gives a .tif its coordinate system, and the scene its unit, its place
+    /// and true north. Coordinates are not changed.
     #[arg(long, value_name = "EPSG:N", value_parser = crs)]
     pub crs: Option<Crs>,
 }

@@ -1,6 +1,7 @@
 //! Flags that place sensors: in grids, on surfaces, along lines.
 
 use std::path::PathBuf;
+use std::sync::OnceLock;
 
 use antumbra_bake::{Surface, UpAxis};
 use clap::{Args, ValueEnum};
@@ -46,20 +47,67 @@ pub struct PlaceArgs {
     /// North is y where z points up, and -z where y does.
     #[arg(long, value_name = "AXIS", value_parser = up_axis)]
     pub up: Option<UpAxis>,
-    /// Angle from mesh to true north
+    #[command(flatten)]
+    pub north: NorthArgs,
+    #[command(flatten)]
+    pub units: UnitArgs,
+}
+
+/// Where north is, if the coordinate system does not say.
+#[derive(Debug, Args)]
+pub struct NorthArgs {
+    /// Angle from mesh to true north [default: by --crs]
     ///
-    /// Clockwise as seen from above: 90 where the x axis of a mesh with z up points north.
-    #[arg(
-        long,
-        value_name = "DEGREES",
-        default_value_t = 0.0,
-        allow_negative_numbers = true,
-        value_parser = values::finite
-    )]
-    pub north: f64,
-    /// Unit: mm, cm, m, km, in or ft
-    #[arg(long, value_enum, default_value_t = Unit::M, hide_possible_values = true)]
-    pub units: Unit,
+    /// Clockwise as seen from above: 90 where the x axis of a mesh with z up points north. If absent: the angle between grid north and
+    /// true north in the coordinate system of the scene (--crs, or the one in a GeoTIFF), or else 0.
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = values::finite)]
+    north: Option<f64>,
+    #[arg(skip)]
+    known: OnceLock<f64>,
+}
+
+impl NorthArgs {
+    /// Notes the angle of the coordinate system. Returns the one that is taken.
+    pub fn settle(&self, degrees: f64) -> f64 {
+        self.north.unwrap_or(*self.known.get_or_init(|| degrees))
+    }
+
+    /// Degrees from north of the mesh to true north, clockwise as seen from above.
+    pub fn degrees(&self) -> f64 {
+        let known = self.known.get().copied();
+        self.north.or(known).unwrap_or(0.0)
+    }
+}
+
+/// Unit of the scene, if the coordinate system does not say.
+#[derive(Debug, Args)]
+pub struct UnitArgs {
+    /// mm, cm, m, km, in or ft [default: by --crs, or m]
+    ///
+    /// If absent: the unit of the coordinate system of the scene (--crs, or the one in a GeoTIFF), or else metres.
+    #[arg(long, value_enum, value_name = "UNIT", hide_possible_values = true)]
+    units: Option<Unit>,
+    #[arg(skip)]
+    known: OnceLock<f64>,
+}
+
+impl UnitArgs {
+    /// Notes the metres of a unit of the coordinate system. Returns those that are taken.
+    pub fn settle(&self, metres: f64) -> f64 {
+        let known = *self.known.get_or_init(|| metres);
+        self.units.map_or(known, Unit::metres)
+    }
+
+    /// Metres in a unit of the scene, if somebody says so.
+    pub fn known(&self) -> Option<f64> {
+        let known = self.known.get().copied();
+        self.units.map(Unit::metres).or(known)
+    }
+
+    /// Metres in a unit of the scene.
+    pub fn metres(&self) -> f64 {
+        self.known().unwrap_or(1.0)
+    }
 }
 
 /// Flags that place sensors on surfaces and along lines, and lift them.

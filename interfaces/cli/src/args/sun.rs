@@ -65,10 +65,12 @@ pub struct SunArgs {
     pub json: Option<Destination>,
     #[command(flatten)]
     pub places: PlaceArgs,
-    /// Latitude in degrees, south negative
-    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, requires = "lon", required_unless_present = "epw", help_heading = heading::SUN)]
+    /// Latitude, south negative [default: by --crs]
+    ///
+    /// If absent: the middle of the scene in its coordinate system (--crs, or the one in a GeoTIFF), or else the place of --epw.
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, requires = "lon", help_heading = heading::SUN)]
     pub lat: Option<f64>,
-    /// Longitude in degrees, west negative
+    /// Longitude, west negative [default: by --crs]
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, requires = "lat", help_heading = heading::SUN)]
     pub lon: Option<f64>,
     /// Above the sea [default: the weather's, or 0]

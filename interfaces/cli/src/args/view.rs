@@ -6,10 +6,11 @@ use antumbra_bake::Moment;
 use clap::Args;
 
 use super::tree::TreeArgs;
-use super::{CameraArgs, MachineArgs, PictureArgs, SCENE, SCENE_LONG, heading};
+use super::{CameraArgs, MachineArgs, NorthArgs, PictureArgs, SCENE, SCENE_LONG, heading};
 
 /// Flags of `view`.
 #[derive(Debug, Args)]
+#[command(mut_arg("north", |north| north.requires("day").help_heading(heading::SUN)))]
 pub struct ViewArgs {
     #[arg(help = SCENE, long_help = SCENE_LONG)]
     pub scene: PathBuf,
@@ -31,9 +32,8 @@ pub struct ViewArgs {
     /// Hours ahead of UTC [default: by the longitude]
     #[arg(long, value_name = "HOURS", allow_negative_numbers = true, requires = "day", help_heading = heading::SUN)]
     pub timezone: Option<f64>,
-    /// From mesh north to true north, clockwise
-    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, requires = "day", help_heading = heading::SUN)]
-    pub north: f64,
+    #[command(flatten)]
+    pub north: NorthArgs,
     #[command(flatten)]
     pub picture: PictureArgs,
     #[command(flatten)]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use antumbra_bake::UpAxis;
 use clap::{ArgGroup, Args};
 
-use super::sensors::{Unit, up_axis};
+use super::sensors::{UnitArgs, up_axis};
 use super::{ChunkArgs, MachineArgs, MapArgs, RasterArgs, SCENE, SCENE_LONG, heading, values};
 use crate::json::Destination;
 
@@ -83,9 +83,8 @@ pub struct VisibleArgs {
     /// Radius of the earth
     #[arg(long, value_name = "METRES", default_value_t = antumbra_bake::EARTH_RADIUS, requires = "curvature", value_parser = values::positive, help_heading = heading::WORK)]
     pub earth_radius: f64,
-    /// Unit, for --curvature: m, ft, ...
-    #[arg(long, value_enum, default_value_t = Unit::M, hide_possible_values = true, requires = "curvature", help_heading = heading::WORK)]
-    pub units: Unit,
+    #[command(flatten, next_help_heading = heading::WORK)]
+    pub units: UnitArgs,
     #[command(flatten)]
     pub chunks: ChunkArgs,
     #[command(flatten)]

@@ -28,7 +28,7 @@ pub struct Bake<'a> {
     /// Shares to take instead of computing anything.
     pub parts: Option<&'a [PartFile]>,
     /// Curvature of the earth that was applied to the scene.
-    pub earth: Option<Earth>,
+    pub earth: Option<Earth<'a>>,
 }
 
 /// Beginning of a JSON document.

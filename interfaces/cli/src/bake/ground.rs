@@ -12,10 +12,12 @@ use antumbra_bake::{
 };
 use antumbra_lab::count;
 use antumbra_load::{Extent, Loaded, MemorySize, Up};
+use antumbra_raster::Crs;
 use antumbra_render::World;
 use antumbra_scene::{Geometry, Scene, Shape, TriangleMesh};
 
 use super::parts::Parts;
+use crate::args::UnitArgs;
 use crate::exit::{Failure, say, tell};
 use crate::output::Files;
 use crate::{input, interrupt, scenes};
@@ -45,7 +47,7 @@ impl Ground {
         isa: Isa,
         memory: MemorySize,
         files: &mut Files,
-        earth: Option<Earth>,
+        earth: Option<Earth<'_>>,
     ) -> Result<Self, Failure> {
         let mut loaded = scenes::load(name, memory)?;
         files.reads_all(&loaded.inputs)?;
@@ -234,17 +236,27 @@ impl Ground {
 
 /// An earth that scenes are bent by.
 #[derive(Clone, Copy, Debug)]
-pub struct Earth {
-    /// In units of the scene.
+pub struct Earth<'a> {
+    /// In metres.
     pub radius: f64,
+    pub units: &'a UnitArgs,
+    /// Coordinate system of the command line.
+    pub crs: Option<&'a Crs>,
     pub refraction: f64,
     /// The up axis, if the command line has one.
     pub up: Option<UpAxis>,
 }
 
-impl Earth {
+impl Earth<'_> {
     /// Bends all meshes, so that lines of sight over a round earth are straight.
     fn bend(self, loaded: &mut Loaded) -> Result<Curvature, Failure> {
+        let raster = loaded.raster.as_ref();
+        let crs = self
+            .crs
+            .or(raster.and_then(|raster| raster.grid.crs.as_ref()));
+        if let Some(metres) = crs.and_then(Crs::metres) {
+            self.units.settle(metres);
+        }
         let scene = &mut loaded.scene;
         let up = match (self.up, loaded.up.axis) {
             (Some(up), _) => up,
@@ -256,7 +268,12 @@ impl Earth {
         let centre = extent.map_or([0.0; 3], |extent| {
             extent.low.midpoint(extent.high).to_array()
         });
-        let curvature = Curvature::new(self.radius, self.refraction, centre, plan);
+        let curvature = Curvature::new(
+            self.radius / self.units.metres(),
+            self.refraction,
+            centre,
+            plan,
+        );
         let curvature = curvature.map_err(Failure::usage)?;
         for shape in &mut scene.shapes {
             let Geometry::Mesh(mesh) = &mut shape.geometry else {

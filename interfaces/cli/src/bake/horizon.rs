@@ -18,6 +18,7 @@ use super::command::{Bake, Head};
 use super::files::{self, Format};
 use super::places::{self, Places};
 use super::raster;
+use super::site::Asked;
 use crate::args::HorizonArgs;
 use crate::exit::{Failure, tell};
 use crate::output::Files;
@@ -88,8 +89,9 @@ pub fn run(
     }
     let mut ground = bake.ground(isa, memory, &mut files)?;
     let up = ground.up(args.places.up)?;
+    asked(args).of(&ground.loaded, up)?;
     let places = Places::new(&args.places, &mut ground, up)?;
-    let compass = Orientation::new(up, args.places.north).map_err(Failure::usage)?;
+    let compass = Orientation::new(up, args.places.north.degrees()).map_err(Failure::usage)?;
     let sensors = &places.sensors;
     let job = HorizonJob::new(&sensors.points, &sensors.normals, &azimuths, &compass)?;
     let done = bake.compute(&job, &ground, &ground.bvh)?;
@@ -129,6 +131,15 @@ pub fn run(
     Ok(())
 }
 
+/// Flags that a coordinate system may answer.
+fn asked(args: &HorizonArgs) -> Asked<'_> {
+    Asked {
+        crs: args.raster.crs.as_ref(),
+        units: Some(&args.places.units),
+        north: Some(&args.places.north),
+    }
+}
+
 /// Whether a height raster is as it is on a map.
 fn is_upright(args: &HorizonArgs) -> bool {
     args.places.up.is_none_or(|up| up == UpAxis::Z)
@@ -161,6 +172,8 @@ fn of_cells(
     };
     let start = Instant::now();
     let grid = &heights.raster.grid;
+    let middle = extent.low.midpoint(extent.high).to_array();
+    asked(args).settle(&name, grid.crs.as_ref(), middle)?;
     let values = &heights.raster.values;
     let field = HeightField::new([grid.width, grid.height], values, grid.transform)?;
     let has_data = |cell: &usize| values[*cell].is_finite();
@@ -177,7 +190,7 @@ fn of_cells(
     // Clockwise from the north of the map.
     let turned: Vec<f64> = azimuths
         .iter()
-        .map(|azimuth| azimuth + args.places.north)
+        .map(|azimuth| azimuth + args.places.north.degrees())
         .collect();
     let job = FieldHorizonJob::new(&field, &observers, &turned, 0.0)?;
     let build_seconds = start.elapsed().as_secs_f64();

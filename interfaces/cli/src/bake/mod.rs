@@ -3,7 +3,7 @@
 //! Each command turns its arguments into a job of the crate `antumbra-bake`, and the result into files and a document.
 //!
 //! - `ao`, `sun`, `visible`, `horizon`, `factors`: one command each;  `merge`: parts of one of them become the whole
-//! - `when`: times of `sun`;  `hourly`, `frames`, `groups`: values by step of time, moving shadows, means by object;  `viewshed`: `visible --viewshed` of a height raster
+//! - `site`: where on the earth a scene is;  `when`: times of `sun`;  `hourly`, `frames`, `groups`: values by step of time, moving shadows, means by object;  `viewshed`: `visible --viewshed` of a height raster
 //! - `command`: the steps that all of them have in common
 //! - `ground`, `parts`, `places`, `view`: scenes, names of their triangles, and points of them
 //! - `chunks`: files of unfinished work and of shares
@@ -24,6 +24,7 @@ pub mod merge;
 mod parts;
 mod places;
 mod raster;
+pub mod site;
 pub mod sun;
 mod view;
 mod viewshed;

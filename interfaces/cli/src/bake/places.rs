@@ -48,7 +48,7 @@ impl Places {
         let level = Orientation::new(up, 0.0).map_err(Failure::usage)?;
         let plan = match args.seen_from {
             Some(side) => {
-                let compass = Orientation::new(up, args.north).map_err(Failure::usage)?;
+                let compass = Orientation::new(up, args.north.degrees()).map_err(Failure::usage)?;
                 let towards = compass.direction(side.azimuth, 0.0);
                 Orientation::from_vectors(towards, compass.up).map_err(Failure::usage)?
             }

@@ -18,8 +18,8 @@ pub fn is_raster(scene: &Path) -> bool {
         .any(|known| extension.eq_ignore_ascii_case(known))
 }
 
-/// Writes values of sensors, which are the vertices of a height raster or the cells of a grid. Coordinates of the scene are
-/// multiplied by `metres` where the scene has no raster.
+/// Writes values of sensors, which are the vertices of a height raster or the cells of a grid. A unit of the scene has so many
+/// `metres`, and coordinates of a grid are written in the unit of the coordinate system.
 pub fn write(
     path: &Path,
     ground: &Ground,
@@ -30,16 +30,19 @@ pub fn write(
     let mut all = match (&sensors.layout, &ground.loaded.raster) {
         (Layout::Vertices, Some(cells)) => RasterCells::clone(cells),
         (Layout::Grid(grid), _) => {
+            let own = ground.loaded.raster.as_ref();
+            let own = own.and_then(|raster| raster.grid.crs.as_ref());
+            let metres = match own {
+                // Coordinates of a raster are those of its system, whatever --units says of lengths.
+                Some(_) => 1.0,
+                None => metres / crs.and_then(Crs::metres).unwrap_or(1.0),
+            };
             let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
             let origin = plan.local(ground.local.origin);
             let corner = [0, 1].map(|axis| metres * (origin[axis] + grid.corner[axis]));
             let size = [grid.width, grid.height];
             let mut known = Grid::north_up(size, corner, metres * grid.spacing);
-            known.crs = ground
-                .loaded
-                .raster
-                .as_ref()
-                .and_then(|raster| raster.grid.crs.clone());
+            known.crs = own.cloned();
             RasterCells {
                 grid: known,
                 cells: grid.cells.clone(),

@@ -153,11 +153,9 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     );
     let mut files = bake.declare(&written, &read)?;
     let weather = args.epw.as_deref().map(read_weather).transpose()?;
-    let when = When::new(args, weather.as_ref())?;
-    let steps = when.steps(args, weather.as_ref())?;
     let mut ground = bake.ground(isa, memory, &mut files)?;
     let up = ground.up(args.places.up)?;
-    let sunlight = when.sunlight(args, steps, up)?;
+    let (when, sunlight) = When::at(args, weather.as_ref(), &ground, up)?;
     if let Some(path) = &args.frames {
         frames::declare(path, &sunlight, &mut files)?;
     }
@@ -424,7 +422,7 @@ impl Baked<'_> {
             orientation: &self.places.plan,
             up: self.up,
             cell: places.grid.unwrap_or_default() / metres,
-            north: places.seen_from.is_none().then_some(places.north),
+            north: places.seen_from.is_none().then_some(places.north.degrees()),
             metres: Some(metres),
         }
     }

@@ -56,6 +56,8 @@ pub fn run(
         return Err(Failure::scene(&name, reason));
     };
     tell_read(&name, &heights, extent);
+    let middle = extent.low.midpoint(extent.high).to_array();
+    visible::asked(args).settle(&name, heights.raster.grid.crs.as_ref(), middle)?;
     let start = Instant::now();
     let grid = &heights.raster.grid;
     let field = HeightField::new(
@@ -134,8 +136,9 @@ pub fn run(
 fn tell_read(name: &str, heights: &Heights, extent: Extent) {
     let [x, y, z] = extent.size().to_array().map(scenes::rounded);
     let grid = &heights.raster.grid;
+    let unit = scenes::unit(grid.crs.as_ref());
     tell(format_args!(
-        "{name}: {x} x {y} x {z} units (x, y, z); z is up, as rasters of heights have it; {} x {} cells",
+        "{name}: {x} x {y} x {z} {unit} (x, y, z); z is up, as rasters of heights have it; {} x {} cells",
         grid.width, grid.height
     ));
 }

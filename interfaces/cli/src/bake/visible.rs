@@ -9,7 +9,7 @@ use antumbra_bake::{
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
-use antumbra_raster::Quantity;
+use antumbra_raster::{Quantity, unit_name};
 use serde::Serialize;
 
 use super::chunks::{self, PartFile};
@@ -17,6 +17,7 @@ use super::command::{Bake, Head, text};
 use super::files::{self, Format};
 use super::ground::{self, Earth, Ground};
 use super::map::{self, Plan, Words};
+use super::site::Asked;
 use super::{raster, viewshed};
 use crate::args::VisibleArgs;
 use crate::exit::{Failure, tell};
@@ -202,7 +203,9 @@ pub fn run(
         machine: &args.machine,
         parts,
         earth: args.curvature.then(|| Earth {
-            radius: args.earth_radius / args.units.metres(),
+            radius: args.earth_radius,
+            units: &args.units,
+            crs: args.raster.crs.as_ref(),
             refraction: args.refraction,
             up: args.up,
         }),
@@ -222,6 +225,7 @@ pub fn run(
     }
     let ground = bake.ground(isa, memory, &mut files)?;
     let up = ground.up(args.up)?;
+    let site = asked(args).of(&ground.loaded, up)?;
     let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
     let points = Points::read(args, &ground, &plan)?;
     points.warn_of_far_ones(args, &ground.bvh.bounds(), ground.local);
@@ -274,8 +278,8 @@ pub fn run(
         orientation: &plan,
         up,
         cell: args.grid.unwrap_or_default(),
-        north: Some(0.0),
-        metres: None,
+        north: Some(site.map_or(0.0, |site| site.north)),
+        metres: args.units.known(),
     };
     write(args, &grid, &points, &matrix)?;
     if let Some(path) = &args.lines {
@@ -296,6 +300,15 @@ pub fn run(
     bake.tell_done("pairs", document.pairs, document.trace_seconds);
     chunks::forget(done.checkpoint.as_deref());
     Ok(())
+}
+
+/// Flags that a coordinate system may answer.
+pub fn asked(args: &VisibleArgs) -> Asked<'_> {
+    Asked {
+        crs: args.raster.crs.as_ref(),
+        units: Some(&args.units),
+        north: None,
+    }
 }
 
 /// Writes all files but the lines of sight.
@@ -329,15 +342,20 @@ fn write(
         }
         Format::Raster => {
             let quantity = Quantity { name, unit: "" };
-            let crs = (args.raster.crs.as_ref(), 1.0);
+            let crs = (args.raster.crs.as_ref(), args.units.metres());
             raster::write(path, ground, (rows, &values()), crs, (plan.up, quantity))
         }
         Format::Picture => {
             let observers = points.columns.as_ref().unwrap_or(rows).points.len();
+            let unit = args
+                .units
+                .known()
+                .map(|metres| format!(" {}", unit_name(metres)));
+            let unit = unit.unwrap_or_default();
             let words = Words {
                 title: format!("Viewshed, {}", ground.loaded.scene.name),
                 subtitle: format!(
-                    "{} observers, eyes {} and targets {} above their places",
+                    "{} observers, eyes {}{unit} and targets {}{unit} above their places",
                     count(observers as u64),
                     args.eye,
                     args.target

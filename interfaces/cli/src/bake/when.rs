@@ -6,7 +6,11 @@ use antumbra_bake::{
     Clock, Error, Moment, Orientation, Place, Refraction, Sunlight, TimeStep, UpAxis, Weather,
     sun_positions,
 };
+use antumbra_raster::Site;
 
+use super::ground::Ground;
+use super::map;
+use super::site::Asked;
 use crate::args::SunArgs;
 use crate::exit::{Failure, say};
 use crate::input;
@@ -40,6 +44,24 @@ fn midnight(year: i32) -> Moment {
 /// Hours that clocks may differ from the sun. Kashgar in the west of China is the farthest, with 2.9.
 const MOST_APART: f64 = 3.0;
 
+/// Kilometres that a place of the command line or of the weather may be from the scene.
+const MOST_FAR: f64 = 50.0;
+
+/// Warns of a place that is not where the coordinate system says that the scene is.
+fn warn_of_far(site: &Site, what: &str, place: Option<(f64, f64)>) {
+    let Some((latitude, longitude)) = place else {
+        return;
+    };
+    let apart = site.kilometres(latitude, longitude);
+    if apart > MOST_FAR {
+        say(format_args!(
+            "warning: {what} {}, {apart:.0} km from the scene, which is at {} by its coordinate system",
+            map::place(latitude, longitude),
+            map::place(site.latitude, site.longitude)
+        ));
+    }
+}
+
 /// The place and its clocks.
 pub struct When {
     pub place: Place,
@@ -49,11 +71,44 @@ pub struct When {
 }
 
 impl When {
-    /// The place and clocks of the command line, or of the weather.
-    pub fn new(args: &SunArgs, weather: Option<&Weather>) -> Result<Self, Failure> {
+    /// Place, clocks, sun and sky of a scene.
+    pub fn at(
+        args: &SunArgs,
+        weather: Option<&Weather>,
+        ground: &Ground,
+        up: UpAxis,
+    ) -> Result<(Self, Sunlight), Failure> {
+        let asked = Asked {
+            crs: args.raster.crs.as_ref(),
+            units: Some(&args.places.units),
+            north: Some(&args.places.north),
+        };
+        let site = asked.of(&ground.loaded, up)?;
+        let when = Self::new(args, weather, site)?;
+        let steps = when.steps(args, weather)?;
+        let sunlight = when.sunlight(args, steps, up)?;
+        Ok((when, sunlight))
+    }
+
+    /// The place and clocks of the command line, or else of the coordinate system, or else of the weather.
+    fn new(args: &SunArgs, weather: Option<&Weather>, site: Option<Site>) -> Result<Self, Failure> {
         let mut place = weather.map(|weather| weather.place).unwrap_or_default();
-        if let (Some(latitude), Some(longitude)) = (args.lat, args.lon) {
-            (place.latitude, place.longitude) = (latitude, longitude);
+        let asked = args.lat.zip(args.lon);
+        let by_system = site.map(|site| (site.latitude, site.longitude));
+        match asked.or(by_system) {
+            Some(found) => (place.latitude, place.longitude) = found,
+            None if weather.is_some() => {}
+            None => {
+                return Err(Failure::Usage(
+                    "the sun needs a place: give --lat and --lon, or --crs if coordinates are those of a map, or --epw".into(),
+                ));
+            }
+        }
+        if let Some(site) = site {
+            let station = weather.map(|weather| weather.place);
+            let station = station.map(|place| (place.latitude, place.longitude));
+            warn_of_far(&site, "--lat and --lon are", asked);
+            warn_of_far(&site, "the weather is of", station);
         }
         place.height = args.altitude.unwrap_or(place.height);
         // Refuses places that are not on the earth, before anything is read.
@@ -85,7 +140,7 @@ impl When {
         let apart = apart - 24.0 * (apart / 24.0).round();
         if apart.abs() > MOST_APART {
             say(format_args!(
-                "warning: UTC{zone:+} and the longitude {} are {:.1} hours apart: the sun stands highest at {:.1} o'clock",
+                "warning: UTC{zone:+} and the longitude {:.2} are {:.1} hours apart: the sun stands highest at {:.1} o'clock",
                 place.longitude,
                 apart.abs(),
                 12.0 + apart,
@@ -94,11 +149,7 @@ impl When {
     }
 
     /// The steps of time that the command line chooses.
-    pub fn steps(
-        &self,
-        args: &SunArgs,
-        weather: Option<&Weather>,
-    ) -> Result<Vec<TimeStep>, Failure> {
+    fn steps(&self, args: &SunArgs, weather: Option<&Weather>) -> Result<Vec<TimeStep>, Failure> {
         let seconds = 60.0 * args.step;
         let times = &args.times;
         if !times.at.is_empty() {
@@ -127,14 +178,15 @@ impl When {
     }
 
     /// Sun and sky in these steps of time.
-    pub fn sunlight(
+    fn sunlight(
         &self,
         args: &SunArgs,
         steps: Vec<TimeStep>,
         up: UpAxis,
     ) -> Result<Sunlight, Failure> {
         let patches = args.sky.patches().map_err(Failure::usage)?;
-        let orientation = Orientation::new(up, args.places.north).map_err(Failure::usage)?;
+        let orientation =
+            Orientation::new(up, args.places.north.degrees()).map_err(Failure::usage)?;
         let is_measured = args.epw.is_some();
         let sunlight = Sunlight::new(&self.place, steps, is_measured, patches, orientation);
         let sunlight = sunlight.and_then(|sunlight| match args.min_elevation > 0.0 {

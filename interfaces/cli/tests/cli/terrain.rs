@@ -262,3 +262,214 @@ fn what_cannot_be_placed_is_refused() {
         );
     }
 }
+
+impl Place {
+    fn write_raster(&self, name: &str, grid: &Grid, heights: &[f32], unit: &str) {
+        let quantity = Quantity {
+            name: "height",
+            unit,
+        };
+        let bytes = write(name.as_ref(), grid, heights, quantity);
+        self.write(name, bytes.expect("a raster"));
+    }
+}
+
+const DAY: [&str; 4] = ["--from", "2025-03-21", "--to", "2025-03-21"];
+
+#[test]
+fn the_place_on_the_earth_comes_from_the_coordinate_system() {
+    let place = place();
+    let sun = |more: &[&str], name: &str| {
+        let args = [
+            "sun", "dem.tif", "--cells", "--step", "10", "--json", "-", "-o", name,
+        ];
+        place.run(&[&args[..], &DAY, more].concat()).expect(0)
+    };
+    let derived = sun(&[], "derived.csv");
+    let about = derived.json();
+    // By pyproj: the middle is at 600 200, 5 339 850 in EPSG:25832.
+    for (key, wanted) in [("latitude", 48.203_97), ("longitude", 10.348_59)] {
+        let found = about[key].as_f64().expect("a number");
+        assert!((found - wanted).abs() < 1e-4, "{key} {found}");
+    }
+    let line = "by EPSG:25832; true north is 1.01 degrees west of grid north";
+    assert!(derived.stderr.contains(line), "{}", derived.stderr);
+    assert!(!derived.stderr.contains("warning"), "{}", derived.stderr);
+    let given = ["--lat", "48.204", "--lon", "10.3486", "--north", "-1.0055"];
+    let given = sun(&given, "given.csv");
+    assert!(!given.stderr.contains("warning"), "{}", given.stderr);
+    // As another computation has it to a few units of the last digit; grid north makes other hours.
+    let table = |name: &str| {
+        let text = fs::read_to_string(place.path(name)).expect("a table");
+        let last = |line: &str| {
+            line.split(',')
+                .nth(6)
+                .map(|x| x.parse::<f64>().expect("hours"))
+        };
+        text.lines().skip(1).filter_map(last).collect::<Vec<f64>>()
+    };
+    let differ = |a: &str, b: &str| {
+        let pairs = table(a).into_iter().zip(table(b));
+        pairs.filter(|(a, b)| a != b).count()
+    };
+    assert!(differ("derived.csv", "given.csv") <= 12);
+    let grid_north = sun(
+        &["--north", "0", "--lat", "10", "--lon", "10.3"],
+        "grid.csv",
+    );
+    for words in [
+        "true north is -1.01 degrees from grid north in EPSG:25832, and --north says 0, which is taken",
+        "warning: --lat and --lon are 10.0000° N, 10.3000° E, 4248 km from the scene",
+    ] {
+        assert!(grid_north.stderr.contains(words), "{}", grid_north.stderr);
+    }
+    sun(&["--north", "0"], "north.csv");
+    assert!(differ("derived.csv", "north.csv") > 30);
+    // Horizons turn with it, too.
+    let horizon = |more: &[&str], name: &str| {
+        let args = [
+            "horizon",
+            "dem.tif",
+            "--cells",
+            "--azimuths",
+            "8",
+            "-o",
+            name,
+        ];
+        place.run(&[&args[..], more].concat()).expect(0);
+        fs::read_to_string(place.path(name)).expect("a table")
+    };
+    let turned = horizon(&[], "a.csv");
+    assert_ne!(turned, horizon(&["--north", "0"], "b.csv"));
+    assert_eq!(turned, horizon(&["--crs", "EPSG:25832"], "c.csv"));
+}
+
+#[test]
+fn models_have_a_place_only_in_map_coordinates() {
+    let place = place();
+    let square = |x: u32, y: u32| {
+        let corners = [[x, y], [x + 40, y], [x + 40, y + 30], [x, y + 30]];
+        let lines = corners.map(|[x, y]| format!("v {x} {y} 0\n"));
+        format!("{}f 1 2 3 4\n", lines.concat())
+    };
+    place.write("map.obj", square(600_000, 5_340_000));
+    place.write("drawing.obj", square(0, 0));
+    place.write("web.obj", square(1_288_000, 6_130_000));
+    let run = |scene: &str, crs: &str| {
+        let args = [
+            "sun", scene, "--grid", "10", "--up", "z", "-o", "a.csv", "--crs", crs,
+        ];
+        place.run(&[&args[..], &DAY].concat())
+    };
+    let found = run("map.obj", "EPSG:25832").expect(0);
+    assert!(
+        found
+            .stderr
+            .contains("at 48.2055° N, 10.3462° E by EPSG:25832"),
+        "{}",
+        found.stderr
+    );
+    for (scene, crs, words) in [
+        (
+            "drawing.obj",
+            "EPSG:25832",
+            "its coordinates are near 0 0, which is no place in EPSG:25832",
+        ),
+        ("drawing.obj", "EPSG:25832", "give --lat and --lon"),
+        (
+            "map.obj",
+            "EPSG:30000",
+            "the place on the earth is not known in EPSG:30000",
+        ),
+        (
+            "web.obj",
+            "EPSG:3857",
+            "lengths in EPSG:3857 are 1.500 times as long as on the ground",
+        ),
+    ] {
+        let refused = run(scene, crs).expect(2);
+        assert!(
+            refused.stderr.contains(words),
+            "{words}: {}",
+            refused.stderr
+        );
+    }
+}
+
+#[test]
+fn a_round_earth_is_as_round_in_feet() {
+    let place = Place::empty();
+    let foot = 1200.0 / 3937.0;
+    for (name, code, metres, unit) in [
+        ("metres.tif", 32_611, 1.0, "m"),
+        ("feet.tif", 2263, foot, "US survey foot"),
+    ] {
+        let cell = 1000.0 / metres;
+        let mut grid = Grid::north_up([200, 200], [300_000.0, 380_000.0], cell);
+        grid.crs = Some(Crs::from_epsg(code).expect("a code"));
+        place.write_raster(name, &grid, &[0.0; 200 * 200], unit);
+        let eye = format!(
+            "x,y\n{},{}\n",
+            300_000.0 + 0.5 * cell,
+            380_000.0 - 0.5 * cell
+        );
+        place.write("eye.csv", eye);
+        let height = (10.0 / metres).to_string();
+        let args = [
+            "visible",
+            name,
+            "eye.csv",
+            "--viewshed",
+            "--curvature",
+            "--eye",
+            &height,
+        ];
+        for (more, out) in [(&[][..], "seen.tif"), (&["--margin", "0.01"], "rays.tif")] {
+            let run = place
+                .run(&[&args[..], more, &["-o", out]].concat())
+                .expect(0);
+            let unit = if metres == 1.0 { "m" } else { "US survey ft" };
+            assert!(
+                run.stderr.contains(&format!(" {unit} (x, y, z)")),
+                "{}",
+                run.stderr
+            );
+            let seen = place.raster(out);
+            let seen = seen.values.iter().filter(|&&count| count == 1.0).count();
+            assert!(
+                seen.abs_diff(142) <= if more.is_empty() { 0 } else { 6 },
+                "{name}: {seen}"
+            );
+        }
+    }
+}
+
+#[test]
+fn rasters_from_the_south_give_the_same_answers() {
+    let place = Place::empty();
+    let height = |cell: usize| (cell * 7919 % 101) as f32 / 10.0;
+    let mut grid = Grid::north_up([20, 15], [600_000.0, 5_340_000.0], 10.0);
+    grid.crs = Some(Crs::from_epsg(25_832).expect("a code"));
+    let heights: Vec<f32> = (0..300).map(height).collect();
+    place.write_raster("north.tif", &grid, &heights, "m");
+    let rows = heights.chunks(20).rev().flatten().copied();
+    grid.transform[3] -= 150.0;
+    grid.transform[5] = 10.0;
+    place.write_raster("south.tif", &grid, &rows.collect::<Vec<f32>>(), "m");
+    place.write("eye.csv", "x,y\n600052,5339941\n600111,5339877\n");
+    let all = |name: &str| {
+        let files = ["seen", "horizon", "sun"].map(|job| format!("{name}-{job}.csv"));
+        for (job, file) in [
+            (
+                &["visible", name, "eye.csv", "--viewshed", "--eye", "2"][..],
+                &files[0],
+            ),
+            (&["horizon", name, "--cells", "--azimuths", "12"], &files[1]),
+            (&[&["sun", name, "--cells"][..], &DAY].concat(), &files[2]),
+        ] {
+            place.run(&[job, &["-o", file]].concat()).expect(0);
+        }
+        files.map(|file| fs::read_to_string(place.path(&file)).expect("a table"))
+    };
+    assert_eq!(all("north.tif"), all("south.tif"));
+}
