@@ -20,20 +20,32 @@ pub struct Steps {
 /// Largest number of steps.
 const MOST: f64 = 7.0;
 
+/// Counts from here on are numbers, not classes.
+const MOST_CLASSES: f32 = 10.0;
+
 /// Share of the values that may lie beyond each end of a legend.
 const BEYOND: f64 = 0.002;
 
 impl Steps {
     /// Steps for these values: round numbers around almost all of them. A few outliers in a thousand may lie beyond, which
-    /// the map marks. Values from 0 up begin at 0, unless they are far from it. With `whole`, steps are whole numbers.
-    /// NaN and infinities do not count.
+    /// the map marks. Values from 0 up begin at 0, unless they are far from it. NaN and infinities do not count.
+    ///
+    /// With `whole` values are counts: each of up to ten is a class of its own, and of more none lies beyond, because the few
+    /// places with the highest count are those that people look for.
     pub fn around(values: &[f32], whole: bool) -> Self {
         let mut known: Vec<f32> = values.iter().copied().filter(|x| x.is_finite()).collect();
         if known.is_empty() {
             return Self::between(0.0, 1.0, whole);
         }
         known.sort_unstable_by(f32::total_cmp);
-        let beyond = (BEYOND * known.len() as f64) as usize;
+        let most = known[known.len() - 1];
+        if whole && known[0] >= 0.0 && most < MOST_CLASSES {
+            let last = most.max(1.0);
+            let class = |i: usize| (i.to_string(), palette::colour(i as f32 / last));
+            return Self::of_classes((0..=last as usize).map(class).collect());
+        }
+        let share = if whole { 0.0 } else { BEYOND };
+        let beyond = (share * known.len() as f64) as usize;
         let [mut low, mut high] = [known[beyond], known[known.len() - 1 - beyond]].map(f64::from);
         if low >= 0.0 && low < 0.6 * high {
             low = 0.0;
@@ -74,12 +86,16 @@ impl Steps {
         let named = classes
             .iter()
             .map(|&(name, colour)| (name.to_owned(), colour));
+        Self::of_classes(named.collect())
+    }
+
+    fn of_classes(classes: Vec<(String, [u8; 3])>) -> Self {
         Self {
             low: 0.0,
             high: classes.len().saturating_sub(1).max(1) as f64,
             marks: (0..classes.len()).map(|i| i as f64).collect(),
             decimals: 0,
-            classes: named.collect(),
+            classes,
         }
     }
 
@@ -168,6 +184,17 @@ mod tests {
         let steps = Steps::around(&counts, true);
         assert_eq!(steps.marks, [0.0, 1.0, 2.0, 3.0]);
         assert_eq!(steps.label(3.0), "3");
+        assert_eq!(steps.classes.len(), 4);
+        // The few places that two observers see.
+        let mut seen = vec![0.0; 1000];
+        seen[7] = 2.0;
+        seen[8] = 1.0;
+        let steps = Steps::around(&seen, true);
+        assert_eq!(steps.marks, [0.0, 1.0, 2.0]);
+        assert_eq!(steps.beyond(&seen), [false; 2]);
+        seen[7] = 40.0;
+        let steps = Steps::around(&seen, true);
+        assert!(steps.classes.is_empty() && steps.high >= 40.0);
     }
 
     #[test]

@@ -22,10 +22,10 @@ pub struct TimeArgs {
     pub hours: Option<[f64; 2]>,
     /// Only months or a season, as 6-8 or winter
     ///
-    /// 11-2 runs over the end of the year. Seasons are meteorological, of the northern hemisphere: spring 3-5, summer 6-8, autumn 9-11,
-    /// winter 12-2.
+    /// 11-2 runs over the end of the year. Seasons are meteorological: north of the equator spring is 3-5, summer 6-8, autumn 9-11 and
+    /// winter 12-2, south of it each is half a year later.
     #[arg(long, value_name = "MONTHS", value_parser = months)]
-    pub months: Option<[u32; 2]>,
+    pub months: Option<Months>,
     /// A single moment, as 2025-03-21T12:00
     ///
     /// May be given several times. Each is a step of --step minutes around it.
@@ -34,18 +34,37 @@ pub struct TimeArgs {
 }
 
 impl TimeArgs {
-    /// Whether a step of time at this hour of the day in this month counts.
-    pub fn counts(&self, hour: f64, month: u32) -> bool {
+    /// Whether a step of time at this hour of the day in this month counts at a latitude.
+    pub fn counts(&self, hour: f64, month: u32, latitude: f64) -> bool {
         let is_in = |hours: [f64; 2], x: f64| match hours[0] <= hours[1] {
             true => hours[0] <= x && x < hours[1],
             false => x >= hours[0] || x < hours[1],
         };
         let is_hour = self.hours.is_none_or(|hours| is_in(hours, hour));
-        let is_month = self.months.is_none_or(|[first, last]| match first <= last {
+        let months = self.months.map(|months| months.at(latitude));
+        let is_month = months.is_none_or(|[first, last]| match first <= last {
             true => (first..=last).contains(&month),
             false => month >= first || month <= last,
         });
         is_hour && is_month
+    }
+}
+
+/// First and last month of a part of the year.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Months {
+    range: [u32; 2],
+    /// Whether the range is a season of the northern hemisphere.
+    is_season: bool,
+}
+
+impl Months {
+    /// The months at a latitude.
+    pub fn at(self, latitude: f64) -> [u32; 2] {
+        match self.is_season && latitude < 0.0 {
+            true => self.range.map(|month| (month + 5) % 12 + 1),
+            false => self.range,
+        }
     }
 }
 
@@ -75,13 +94,17 @@ fn hours(text: &str) -> Result<[f64; 2], String> {
     }
 }
 
-fn months(text: &str) -> Result<[u32; 2], String> {
-    match text.to_ascii_lowercase().as_str() {
-        "spring" => return Ok([3, 5]),
-        "summer" => return Ok([6, 8]),
-        "autumn" | "fall" => return Ok([9, 11]),
-        "winter" => return Ok([12, 2]),
-        _ => {}
+fn months(text: &str) -> Result<Months, String> {
+    let season = match text.to_ascii_lowercase().as_str() {
+        "spring" => Some([3, 5]),
+        "summer" => Some([6, 8]),
+        "autumn" | "fall" => Some([9, 11]),
+        "winter" => Some([12, 2]),
+        _ => None,
+    };
+    if let Some(range) = season {
+        let is_season = true;
+        return Ok(Months { range, is_season });
     }
     let (first, last) = text.split_once('-').unwrap_or((text, text));
     let month = |text: &str| {
@@ -89,7 +112,10 @@ fn months(text: &str) -> Result<[u32; 2], String> {
         month.filter(|month| (1..=12).contains(month))
     };
     match (month(first), month(last)) {
-        (Some(first), Some(last)) => Ok([first, last]),
+        (Some(first), Some(last)) => Ok(Months {
+            range: [first, last],
+            is_season: false,
+        }),
         _ => Err("wanted months from 1 to 12, such as 6 or 6-8, or a season".into()),
     }
 }

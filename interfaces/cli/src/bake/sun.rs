@@ -37,6 +37,9 @@ struct Document<'a> {
     latitude: f64,
     longitude: f64,
     timezone: f64,
+    /// Hours ahead of UTC, as people read them: two where the clocks change.
+    #[serde(skip)]
+    zones: String,
     /// Steps of time, and those with a sun above the horizon.
     steps: usize,
     suns: usize,
@@ -215,7 +218,7 @@ pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Re
     document.total_seconds = begin.elapsed().as_secs_f64();
     json::write(&document, args.json.as_ref())?;
     ground.tell("");
-    document.tell();
+    document.tell(args.en17037.then_some(args.min_elevation));
     let without = found.values.hours.iter().filter(|x| x.is_nan()).count();
     if without > 0 {
         tell(format_args!(
@@ -435,7 +438,8 @@ impl Baked<'_> {
             return moments.join(", ");
         }
         let mut period = self.whole_period();
-        if let Some([first, last]) = times.months {
+        if let Some(months) = times.months {
+            let [first, last] = months.at(self.when.place.latitude);
             period += &format!(", months {first} to {last}");
         }
         if let Some([from, to]) = times.hours {
@@ -576,6 +580,10 @@ impl<'a> Document<'a> {
             latitude: when.place.latitude,
             longitude: when.place.longitude,
             timezone: when.zone,
+            zones: match when.zones {
+                [winter, summer] if winter < summer => format!("UTC{winter:+} and {summer:+}"),
+                [zone, _] => format!("UTC{zone:+}"),
+            },
             steps: 0,
             suns: 0,
             step_hours: 0.0,
@@ -610,17 +618,23 @@ impl<'a> Document<'a> {
         self.mean_diffuse_kwh_m2 = mean(&values.diffuse);
     }
 
-    fn tell(&self) {
+    /// Prints the figures. `en17037_from` is the least elevation of suns, where the standard is applied.
+    fn tell(&self, en17037_from: Option<f64>) {
         tell(format_args!(
-            "{} sensors, {} suns of {} steps at {:.4}, {:.4} and UTC{:+}, {} patches",
+            "{} sensors, {} suns of {} steps at {:.4}, {:.4} and {}, {} patches",
             count(self.sensors as u64),
             count(self.suns as u64),
             count(self.steps as u64),
             self.latitude,
             self.longitude,
-            self.timezone,
+            self.zones,
             self.patches,
         ));
+        if en17037_from == Some(0.0) {
+            tell(format_args!(
+                "EN 17037: suns count from 0 degrees above the horizon; --min-elevation gives the angle of a country, such as 11 in Germany"
+            ));
+        }
         if let (Some(hours), Some(view)) = (self.mean_hours, self.mean_sky_view) {
             tell(format_args!(
                 "mean: {hours:.1} hours of direct sun, sky view factor {view:.3}"

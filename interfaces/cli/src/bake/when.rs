@@ -68,6 +68,8 @@ pub struct When {
     pub clock: Clock,
     /// Hours ahead of UTC at the beginning.
     pub zone: f64,
+    /// Least and most hours ahead of UTC, which summer time changes.
+    pub zones: [f64; 2],
 }
 
 impl When {
@@ -124,10 +126,22 @@ impl When {
             (None, Some(weather)) => Clock::Fixed(weather.zone),
             (None, None) => Clock::Fixed(by_longitude),
         };
-        // Of a time zone, in winter.
-        let january = midnight(args.from.map_or(args.year, |from| from.year));
-        let zone = clock.hours_ahead(clock.unix(&january));
-        let when = Self { place, clock, zone };
+        let begin = args.from.unwrap_or(midnight(args.year));
+        let end = args.to.unwrap_or(midnight(args.year + 1));
+        let moments = args.times.at.first().zip(args.times.at.last());
+        let (begin, end) = moments.map_or((begin, end), |(first, last)| (*first, *last));
+        let ends = [begin, end].map(|moment| clock.unix(&moment));
+        // Clocks change twice a year.
+        let times = (0..=12).map(|i| ends[0] + f64::from(i) / 12.0 * (ends[1] - ends[0]));
+        let zones: Vec<f64> = times.map(|time| clock.hours_ahead(time)).collect();
+        let zones = [f64::min, f64::max].map(|pick| zones.iter().copied().fold(zones[0], pick));
+        let zone = clock.hours_ahead(ends[0]);
+        let when = Self {
+            place,
+            clock,
+            zone,
+            zones,
+        };
         when.warn_of_clocks();
         Ok(when)
     }
@@ -169,7 +183,7 @@ impl When {
                 })?
             }
         };
-        steps.retain(|step| times.counts(step.hour(), step.begin.month));
+        steps.retain(|step| times.counts(step.hour(), step.begin.month, self.place.latitude));
         if steps.is_empty() {
             let reason = "--hours, --months: no step of time is left";
             return Err(Failure::Usage(reason.into()));

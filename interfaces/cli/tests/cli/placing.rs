@@ -137,6 +137,29 @@ fn hours_of_the_day_are_those_of_the_clocks() {
     let summer = ["--up", "z", "--months", "summer", "--hours", "12-13"];
     place.run(&[&args[..], &summer].concat()).expect(0);
     assert_eq!(hours(&place), [92.0]);
+    // December to February.
+    let sydney = [&args[..6], &["--lat", "-33.87", "--lon", "151.2"]].concat();
+    let run = place.run(&[&sydney[..], &summer].concat()).expect(0);
+    assert_eq!(hours(&place), [90.0]);
+    assert!(run.stderr.contains("UTC+10,"), "{}", run.stderr);
+    for (dates, zone) in [
+        (["2025-06-21", "2025-06-21"], "UTC+2,"),
+        (["2025-01-21", "2025-01-21"], "UTC+1,"),
+        (["2025-03-01", "2025-04-30"], "UTC+1 and +2,"),
+    ] {
+        let days = [
+            "--from",
+            dates[0],
+            "--to",
+            dates[1],
+            "--timezone",
+            "Europe/Vienna",
+        ];
+        let run = place
+            .run(&[&args[..], &days, &["--up", "z"]].concat())
+            .expect(0);
+        assert!(run.stderr.contains(zone), "{}", run.stderr);
+    }
     for (flags, word) in [
         (["--hours", "9"], "wanted two hours"),
         (["--months", "0-3"], "months from 1 to 12"),
