@@ -6,46 +6,27 @@ use ::gltf::Semantic;
 use ::gltf::json::validation::Checked;
 use ::gltf::json::{Root, Value, scene};
 
-/// Names of the lists whose elements are needed or not, as paths of mistakes begin.
-const LISTS: [&str; 11] = [
-    "scenes",
-    "nodes",
-    "meshes",
-    "skins",
-    "cameras",
-    "materials",
-    "accessors",
-    "bufferViews",
-    "buffers",
-    "textures",
-    "images",
-];
-
 /// Elements that are needed, by list and index. Indices may be out of range.
 pub(super) struct Needs(HashMap<&'static str, Vec<bool>>);
 
 impl Needs {
     /// What the scene that is shown refers to, with or without images.
     pub fn of(root: &Root, looks: bool) -> Self {
-        let lengths = [
-            root.scenes.len(),
-            root.nodes.len(),
-            root.meshes.len(),
-            root.skins.len(),
-            root.cameras.len(),
-            root.materials.len(),
-            root.accessors.len(),
-            root.buffer_views.len(),
-            root.buffers.len(),
-            root.textures.len(),
-            root.images.len(),
+        let lists = [
+            ("scenes", root.scenes.len()),
+            ("nodes", root.nodes.len()),
+            ("meshes", root.meshes.len()),
+            ("skins", root.skins.len()),
+            ("cameras", root.cameras.len()),
+            ("materials", root.materials.len()),
+            ("accessors", root.accessors.len()),
+            ("bufferViews", root.buffer_views.len()),
+            ("buffers", root.buffers.len()),
+            ("textures", root.textures.len()),
+            ("images", root.images.len()),
         ];
-        let lists = LISTS.iter().zip(lengths);
-        let mut needs = Self(
-            lists
-                .map(|(&list, length)| (list, vec![false; length]))
-                .collect(),
-        );
+        let lists = lists.map(|(list, length)| (list, vec![false; length]));
+        let mut needs = Self(lists.into());
         needs.nodes(root);
         if looks && needs.0["materials"].contains(&true) {
             for list in ["textures", "images"] {

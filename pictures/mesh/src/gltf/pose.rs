@@ -1,8 +1,10 @@
 //! Meshes at rest: morph targets with their default weights, and skins.
 
-use glam::{DMat3, DMat4, DVec3, DVec4, Vec3};
+use std::collections::HashSet;
+
+use glam::{DMat3, DMat4, DVec3, DVec4, Mat4, Vec3};
 use gltf::accessor::Dimensions;
-use gltf::{Document, Node, Primitive, Semantic, Skin};
+use gltf::{Document, Primitive, Semantic, Skin};
 
 use super::accessors::Numbers;
 use super::reader::Reader;
@@ -16,67 +18,43 @@ pub(super) struct Pose<'a> {
     pub joints: Vec<DMat4>,
 }
 
-/// Transformations of nodes to the world, whether the shown scene has them or not.
-pub(super) struct Worlds {
-    parents: Vec<Option<usize>>,
-    known: Vec<Option<DMat4>>,
-    root: DMat4,
+/// Indices of the nodes without a parent.
+pub(super) fn roots(document: &Document) -> Vec<usize> {
+    let nodes = &document.as_json().nodes;
+    let children = nodes.iter().flat_map(|node| node.children.iter().flatten());
+    let children: HashSet<usize> = children.map(|child| child.value()).collect();
+    (0..nodes.len())
+        .filter(|index| !children.contains(index))
+        .collect()
 }
 
-impl Worlds {
-    /// Of a document whose roots are placed by `root`.
-    pub fn new(document: &Document, root: DMat4) -> Self {
-        let nodes = &document.as_json().nodes;
-        let mut parents = vec![None; nodes.len()];
-        for (parent, node) in nodes.iter().enumerate() {
-            for child in node.children.iter().flatten() {
-                if let Some(slot) = parents.get_mut(child.value()) {
-                    *slot = Some(parent);
-                }
-            }
-        }
-        let known = vec![None; nodes.len()];
-        Self {
-            parents,
-            known,
-            root,
+/// Transformations of all nodes to a world in which `root` places those without a parent, whether the shown scene has them or
+/// not. A node that is its own ancestor stays there.
+pub(super) fn worlds(document: &Document, root: DMat4) -> Vec<DMat4> {
+    let mut worlds = vec![None; document.nodes().len()];
+    let mut open: Vec<_> = roots(document)
+        .into_iter()
+        .map(|node| (node, root))
+        .collect();
+    while let Some((index, to_parent)) = open.pop() {
+        if let (Some(slot @ None), Some(node)) =
+            (worlds.get_mut(index), document.nodes().nth(index))
+        {
+            let own = Mat4::from_cols_array_2d(&node.transform().matrix());
+            let to_world = *slot.insert(to_parent * own.as_dmat4());
+            let children = document.as_json().nodes[index].children.iter().flatten();
+            open.extend(children.map(|child| (child.value(), to_world)));
         }
     }
-
-    /// Transformation of a node. The ancestors of a node that is its own end where they repeat.
-    fn of(&mut self, document: &Document, node: usize) -> DMat4 {
-        let mut chain = Vec::new();
-        let mut next = Some(node);
-        let mut world = self.root;
-        while let Some(index) = next {
-            match self.known[index] {
-                Some(known) => {
-                    world = known;
-                    break;
-                }
-                None if chain.len() > self.known.len() => break,
-                None => chain.push(index),
-            }
-            next = self.parents[index];
-        }
-        for index in chain.into_iter().rev() {
-            if let Some(node) = document.nodes().nth(index) {
-                world *= own(&node);
-            }
-            self.known[index] = Some(world);
-        }
-        world
-    }
-}
-
-/// Transformation of a node to its parent.
-pub(super) fn own(node: &Node) -> DMat4 {
-    glam::Mat4::from_cols_array_2d(&node.transform().matrix()).as_dmat4()
+    worlds
+        .into_iter()
+        .map(|to_world| to_world.unwrap_or(root))
+        .collect()
 }
 
 impl Reader<'_> {
     /// Matrices of the joints of a skin, from its mesh to the world.
-    pub fn joints(&mut self, skin: &Skin, worlds: &mut Worlds) -> Result<Vec<DMat4>, String> {
+    pub fn joints(&mut self, skin: &Skin, worlds: &[DMat4]) -> Result<Vec<DMat4>, String> {
         let joints: Vec<usize> = skin.joints().map(|joint| joint.index()).collect();
         let inverse = match skin.inverse_bind_matrices() {
             Some(accessor) => {
@@ -93,10 +71,9 @@ impl Reader<'_> {
                 joints.len()
             ));
         }
-        let document = self.document;
         let matrices = joints.into_iter().zip(inverse);
         Ok(matrices
-            .map(|(joint, inverse)| worlds.of(document, joint) * inverse)
+            .map(|(joint, inverse)| worlds[joint] * inverse)
             .collect())
     }
 

@@ -13,7 +13,7 @@ use gltf::{Accessor, Document, Mesh, Node, Primitive, Semantic};
 
 use super::accessors::{self, Numbers};
 use super::looks::{Look, Looks};
-use super::pose::{self, Pose, Worlds};
+use super::pose::{Pose, roots, worlds};
 use super::{DRACO, compressed, needs, places};
 use crate::images::Images;
 use crate::{Model, Part, Warning};
@@ -23,7 +23,7 @@ const PER_INSTANCE: u64 = 512;
 
 /// State of reading: the model so far, the memory left, and the mistakes.
 pub(super) struct Reader<'a> {
-    pub document: &'a Document,
+    document: &'a Document,
     buffers: &'a [Cow<'a, [u8]>],
     looks: Looks<'a>,
     model: Model,
@@ -172,18 +172,17 @@ impl<'a> Reader<'a> {
         let document = self.document;
         let mut placed = Vec::new();
         let mut visited = vec![false; document.nodes().len()];
-        let root = DMat4::from_translation(-origin);
-        let mut worlds = Worlds::new(document, root);
+        let worlds = worlds(document, DMat4::from_translation(-origin));
         let scene = document.default_scene().or(document.scenes().next());
-        let mut open: Vec<_> = match scene {
-            Some(scene) => scene.nodes().collect::<Vec<_>>(),
-            None => roots(document),
-        }
-        .into_iter()
-        .rev()
-        .map(|node| (node, root))
-        .collect();
-        while let Some((node, to_parent)) = open.pop() {
+        let mut open: Vec<Node> = match scene {
+            Some(scene) => scene.nodes().collect(),
+            None => roots(document)
+                .into_iter()
+                .filter_map(|root| document.nodes().nth(root))
+                .collect(),
+        };
+        open.reverse();
+        while let Some(node) = open.pop() {
             let index = node.index();
             if std::mem::replace(&mut visited[index], true) {
                 self.mistakes.push(format!(
@@ -195,10 +194,9 @@ impl<'a> Reader<'a> {
             if visible.and_then(|value| value.get("visible")?.as_bool()) == Some(false) {
                 continue;
             }
-            let to_world = to_parent * pose::own(&node);
+            let to_world = worlds[index];
             if let Some(mesh) = node.mesh()
-                && let Err(mistake) =
-                    self.add_places(&node, mesh, to_world, &mut worlds, &mut placed)
+                && let Err(mistake) = self.add_places(&node, mesh, &worlds, &mut placed)
             {
                 self.mistakes.push(format!("node {index}: {mistake}"));
             }
@@ -209,7 +207,7 @@ impl<'a> Reader<'a> {
                 places::add_light(&light, to_world.as_mat4(), &mut self.model);
             }
             let children: Vec<_> = node.children().collect();
-            open.extend(children.into_iter().rev().map(|child| (child, to_world)));
+            open.extend(children.into_iter().rev());
         }
         placed
     }
@@ -219,8 +217,7 @@ impl<'a> Reader<'a> {
         &mut self,
         node: &Node<'a>,
         mesh: Mesh<'a>,
-        to_world: DMat4,
-        worlds: &mut Worlds,
+        worlds: &[DMat4],
         placed: &mut Vec<Placed<'a>>,
     ) -> Result<(), String> {
         let name = node.name().or(mesh.name()).unwrap_or_default();
@@ -231,7 +228,7 @@ impl<'a> Reader<'a> {
         let weights = node.weights();
         let is_own = weights.is_some() || !joints.is_empty();
         let pose = is_own.then_some(Pose { weights, joints });
-        for to_world in self.places(node, to_world)? {
+        for to_world in self.places(node, worlds[node.index()])? {
             placed.push(Placed {
                 mesh: mesh.clone(),
                 to_world,
@@ -501,16 +498,6 @@ impl<'a> Reader<'a> {
         };
         Ok((0..count).map(place).collect())
     }
-}
-
-/// Nodes without a parent, the roots of a file without scenes.
-fn roots(document: &Document) -> Vec<Node<'_>> {
-    let nodes = document.nodes();
-    let mut child = vec![false; nodes.len()];
-    for node in nodes.clone().flat_map(|node| node.children()) {
-        child[node.index()] = true;
-    }
-    nodes.filter(|node| !child[node.index()]).collect()
 }
 
 /// Triangles of a list, strip or fan of corners; none for other modes. Incomplete triangles are dropped.
