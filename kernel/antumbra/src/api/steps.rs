@@ -167,7 +167,7 @@ impl Steps for Bvh {
     }
 
     fn plan(&self, order: Order, log: Option<&Log>, model: &CostModel) -> Result<SlotOrder, Error> {
-        order::plan(&self.tree, order, log, model)
+        order::plan(&self.tree, order, log, model, &())
     }
 
     fn predicted_cost(
@@ -320,7 +320,8 @@ impl Bvh {
         if log.is_none() && order.learns() {
             return Ok(None);
         }
-        let plan = self.plan(*order, log, costs)?;
+        let plan = order::plan(&self.tree, *order, log, costs, monitor)?;
+        reached(0.93, monitor)?;
         times.order += stopwatch.lap();
         let predicted = match log {
             Some(log) if !order.picks_by_ray() && log.kind().boxes => Some([

@@ -17,6 +17,7 @@ pub(crate) mod size;
 
 use crate::error::Error;
 use crate::learn::{Log, LogKind};
+use crate::monitor::BuildMonitor;
 use crate::tree::costs::CostModel;
 use crate::tree::node::{AS_THEY_ARE, NodeRef, PerSlot};
 use crate::tree::slot_order::{Pick, SlotOrder};
@@ -180,6 +181,7 @@ pub(crate) fn plan(
     order: Order,
     log: Option<&Log>,
     model: &CostModel,
+    monitor: &dyn BuildMonitor,
 ) -> Result<SlotOrder, Error> {
     let needed = || log.ok_or(Error::NeedsLog(order.name()));
     let with_boxes = || {
@@ -197,7 +199,7 @@ pub(crate) fn plan(
         Order::SortMinus => ratio::plan(tree, needed()?, model, Estimate::Poor),
         Order::Sort | Order::SortPlus => ratio::plan(tree, with_boxes()?, model, Estimate::Precise),
         Order::Visits => ratio::plan(tree, with_boxes()?, model, Estimate::Visited),
-        Order::Joint => joint::plan(tree, needed()?, model),
+        Order::Joint => joint::plan(tree, needed()?, model, monitor),
         Order::Other(other) => other.plan(tree, log, model).map(|planned| SlotOrder {
             pick: other.pick(),
             ..planned

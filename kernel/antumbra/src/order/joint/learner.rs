@@ -6,6 +6,7 @@ use alloc::vec::Vec;
 use super::groups::least_cost;
 use super::passage::{Passage, by_ratio};
 use crate::learn::ray_log::{RayLog, Visit};
+use crate::monitor::BuildMonitor;
 use crate::order::sorted_slots;
 use crate::tree::costs::CostModel;
 use crate::tree::node::{ChildKind, MAX_WIDTH, NodeRef, PerSlot};
@@ -66,10 +67,13 @@ impl<'a> Learner<'a> {
         }
     }
 
-    /// The orders of all nodes.
-    pub fn learn(&mut self) -> SlotOrder {
+    /// The orders of all nodes, after fewer rounds if the monitor stops it.
+    pub fn learn(&mut self, monitor: &dyn BuildMonitor) -> SlotOrder {
         let mut order = self.sort_all();
         for _ in 1..ROUNDS {
+            if monitor.cancelled() {
+                break;
+            }
             self.trace(&order);
             order = self.sort_all();
         }

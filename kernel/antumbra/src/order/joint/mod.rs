@@ -26,6 +26,7 @@ mod tests;
 
 use crate::error::Error;
 use crate::learn::log::Log;
+use crate::monitor::BuildMonitor;
 use crate::order::Order;
 use crate::order::ratio::all_sorted_lanes;
 use crate::tree::costs::CostModel;
@@ -34,11 +35,16 @@ use crate::tree::wide::Tree;
 
 use learner::Learner;
 
-/// Works out the order of least measured cost.
-pub(crate) fn plan(tree: &Tree, log: &Log, model: &CostModel) -> Result<SlotOrder, Error> {
+/// Works out the order of least measured cost. If the monitor stops it, the order is of no use.
+pub(crate) fn plan(
+    tree: &Tree,
+    log: &Log,
+    model: &CostModel,
+    monitor: &dyn BuildMonitor,
+) -> Result<SlotOrder, Error> {
     Error::unless_fits(log.shape(), tree.shape())?;
     let rays = log.masks().ok_or(Error::NeedsMasks(Order::Joint.name()))?;
-    let mut order = Learner::new(tree, rays, model).learn();
+    let mut order = Learner::new(tree, rays, model).learn(monitor);
     order.lanes = all_sorted_lanes(tree, log);
     Ok(order)
 }

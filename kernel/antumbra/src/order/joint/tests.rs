@@ -80,7 +80,7 @@ fn measured(bvh: &Bvh, rays: &[Ray]) -> f64 {
 fn accounted(bvh: &Bvh, log: &Log) -> f64 {
     let rays = log.masks().expect("masks");
     let mut learner = Learner::new(&bvh.tree, rays, &MODEL);
-    learner.learn();
+    learner.learn(&());
     total(&learner)
 }
 
