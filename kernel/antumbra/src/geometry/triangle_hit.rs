@@ -36,7 +36,7 @@
 //! larger than `|n|`.
 //!
 //! A distance that is not in the interval of the ray stays the one that decides. Where the ray passes beside the triangle, by
-//! no more than the sheared corners are off, the weights are those of the nearest point of the triangle.
+//! no more than the sheared corners are off, the weights are of the nearest point of the triangle.
 //!
 //! What vectors can say sooner is in [`crate::geometry::edge_test`], why no tree loses a hit in
 //! [`crate::geometry::ray_setup`].
