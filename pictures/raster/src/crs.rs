@@ -210,6 +210,10 @@ impl Crs {
     /// one of the map: its latitudes differ from latitudes of WGS 84 by less than 0.01 degrees.
     pub fn site(&self, [x, y]: [f64; 2]) -> Option<Site> {
         let projection = self.projection()?;
+        // A file that names another unit than its system does speaks against itself.
+        if (self.metres()? / projection.to_meter() - 1.0).abs() > 1e-5 {
+            return None;
+        }
         // Without a datum, so that none is changed.
         let globe = Proj::from_proj_string("+proj=longlat +ellps=WGS84").ok()?;
         let mut place = (x, y, 0.0);
@@ -645,6 +649,10 @@ mod tests {
         let utm = Crs::from_epsg(25_832).expect("a code");
         assert_eq!(utm.site([1e12, 1e12]), None);
         assert_eq!(utm.site([f64::NAN, 0.0]), None);
+        let mut feet = utm.clone();
+        feet.directory[3] += 1;
+        feet.directory.extend([LINEAR_UNIT, 0, 1, 9002]);
+        assert_eq!(feet.site([691_184.0, 5_335_055.0]), None);
         let near = utm.site([691_184.0, 5_335_055.0]).expect("a place");
         assert!((near.north + 1.91).abs() < 0.01, "{near:?}");
         assert!((near.kilometres(near.latitude + 0.45, near.longitude) - 50.0).abs() < 0.1);
