@@ -65,13 +65,13 @@ fn missing_files_are_warnings_and_errors_if_strict() {
         let commands = [
             &["render", "model.obj", "-o", "o.exr", "--spp", "1"][..],
             &["info", "model.obj"],
-            &["ao", "model.obj", "-o", "o.ply", "--samples", "1"],
         ];
         for command in commands {
-            // Warnings are said even if little is to be said.
-            let run = place.run(&[command, &["-q"]].concat()).expect(0);
+            let run = place.run(command).expect(0);
             let warning = format!("{at}warning: {reason}");
             assert_eq!(run.stderr.matches(&warning).count(), 1, "{}", run.stderr);
+            let run = place.run(&[command, &["-q"]].concat()).expect(0);
+            assert_eq!(run.stderr, "");
             let before = place.files();
             let run = place.run(&[command, &["--strict"]].concat()).expect(65);
             let error = format!("{at}error: {reason}");
@@ -79,6 +79,18 @@ fn missing_files_are_warnings_and_errors_if_strict() {
             assert!(!run.stderr.contains("warning"), "{}", run.stderr);
             assert_eq!(place.files(), before);
         }
+        // Bakes use no materials.
+        let bake = [
+            "ao",
+            "model.obj",
+            "-o",
+            "o.ply",
+            "--samples",
+            "1",
+            "--strict",
+        ];
+        let run = place.run(&bake).expect(0);
+        assert!(!run.stderr.contains("looks.mtl"), "{}", run.stderr);
     }
     // What is all there is no error.
     let place = with_models();
