@@ -220,9 +220,9 @@ impl Ground {
         plan: &Orientation,
     ) -> Result<Sensors, Failure> {
         let offset = self.bvh.bounds().origin_offset();
-        if f64::from(offset) > 1e-3 * spacing {
+        if f64::from(offset) > 1e-2 * spacing {
             say(format_args!(
-                "warning: rays begin {offset:.2e} above surfaces, more than a thousandth of the {spacing} between sensors: the \
+                "warning: rays begin {offset:.2e} above surfaces, more than a hundredth of the {spacing} between sensors: the \
                  scene is large for such a grid"
             ));
         }
