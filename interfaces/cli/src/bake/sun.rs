@@ -18,7 +18,7 @@ use super::files::{self, Format};
 use super::ground::Ground;
 use super::map::{self, Plan, Words};
 use super::places::{self, Places};
-use super::when::{When, read_weather};
+use super::when::{self, When, read_weather};
 use super::{frames, groups, hourly, raster};
 use crate::args::{Shown, SunArgs};
 use crate::exit::{Failure, say, tell};
@@ -84,6 +84,7 @@ pub fn check(args: &SunArgs) -> Result<(), Failure> {
         }
     }
     places::check(&args.places)?;
+    when::check(args)?;
     if args.frames.is_some() && args.places.grid.is_none() {
         return Err(Failure::Usage("--frames: maps need --grid".into()));
     }

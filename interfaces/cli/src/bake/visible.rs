@@ -202,7 +202,7 @@ pub fn run(
         chunks: &args.chunks,
         machine: &args.machine,
         parts,
-        earth: args.curvature.then(|| Earth {
+        earth: args.curvature.then_some(Earth {
             radius: args.earth_radius,
             units: &args.units,
             crs: args.raster.crs.as_ref(),

@@ -10,6 +10,7 @@ use antumbra_raster::Site;
 
 use super::ground::Ground;
 use super::map;
+use super::raster::is_raster;
 use super::site::Asked;
 use crate::args::SunArgs;
 use crate::exit::{Failure, say};
@@ -43,6 +44,20 @@ fn midnight(year: i32) -> Moment {
 
 /// Hours that clocks may differ from the sun. Kashgar in the west of China is the farthest, with 2.9.
 const MOST_APART: f64 = 3.0;
+
+/// Refuses flags that leave the place open, before anything is read.
+pub fn check(args: &SunArgs) -> Result<(), Failure> {
+    let is_given = args.lat.is_some() || args.epw.is_some();
+    match is_given || args.raster.crs.is_some() || is_raster(&args.scene) {
+        true => Ok(()),
+        false => Err(no_place()),
+    }
+}
+
+fn no_place() -> Failure {
+    let reason = "the sun needs a place: give --lat and --lon, or --crs if coordinates are those of a map, or --epw";
+    Failure::Usage(reason.into())
+}
 
 /// Kilometres that a place of the command line or of the weather may be from the scene.
 const MOST_FAR: f64 = 50.0;
@@ -100,11 +115,7 @@ impl When {
         match asked.or(by_system) {
             Some(found) => (place.latitude, place.longitude) = found,
             None if weather.is_some() => {}
-            None => {
-                return Err(Failure::Usage(
-                    "the sun needs a place: give --lat and --lon, or --crs if coordinates are those of a map, or --epw".into(),
-                ));
-            }
+            None => return Err(no_place()),
         }
         if let Some(site) = site {
             let station = weather.map(|weather| weather.place);

@@ -233,6 +233,11 @@ fn what_cannot_be_placed_is_refused() {
             "point 1",
         ),
         (&["ao", "plain.npy", "-o", "a.ply"], "no .npy"),
+        // Before a scene is read, or found.
+        (
+            &["sun", "none.obj", "--grid", "9", "-o", "a.csv"],
+            "the sun needs a place: give --lat",
+        ),
         (
             &["ao", "builtin:city", "-o", "a.tif"],
             "needs a scene that is one",
@@ -442,6 +447,17 @@ fn a_round_earth_is_as_round_in_feet() {
             );
         }
     }
+    let args = [
+        "visible",
+        "feet.tif",
+        "eye.csv",
+        "--viewshed",
+        "--units",
+        "m",
+    ];
+    let doubted = place.run(&[&args[..], &["-o", "a.tif"]].concat()).expect(0);
+    let words = "coordinates in EPSG:2263 are in US survey ft, and --units says m, which is taken";
+    assert!(doubted.stderr.contains(words), "{}", doubted.stderr);
 }
 
 #[test]
