@@ -163,10 +163,22 @@ pub fn as_array<'py>(
     object: &Bound<'py, PyAny>,
     name: &str,
 ) -> PyResult<Bound<'py, PyUntypedArray>> {
+    let numpy = object.py().import("numpy")?;
+    // What is masked is no number, whatever lies below.
+    if object.hasattr("fill_value")? {
+        let masked = numpy
+            .getattr("ma")?
+            .call_method1("count_masked", (object,))?;
+        let masked: usize = masked.extract()?;
+        if masked > 0 {
+            return Err(PyValueError::new_err(format!(
+                "{name}: {masked} numbers are masked; leave their rows out, or give .filled(numpy.nan)"
+            )));
+        }
+    }
     if let Ok(array) = object.cast::<PyUntypedArray>() {
         return Ok(array.clone());
     }
-    let numpy = object.py().import("numpy")?;
     let known = ["__array__", "__array_interface__", "__array_struct__"];
     let mut is_known = false;
     for name in known {

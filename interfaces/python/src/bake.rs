@@ -1,11 +1,13 @@
 //! Numbers about points: ambient occlusion, sky, sun, and visibility between points.
 
+use std::ffi::CString;
+
 use antumbra_bake::{
     AmbientOcclusion, Atlas, Irradiance, Layout, Mesh, Moment, Orientation, Place, Refraction,
     Sensors, SkyDivision, SkyPatches, SunJob, Sunlight, TimeStep, UpAxis, Weighting,
 };
 use numpy::{PyArray1, PyArrayDyn};
-use pyo3::exceptions::{PyMemoryError, PyValueError};
+use pyo3::exceptions::{PyMemoryError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 
 use crate::arrays::{Numbers, read_faces, shaped, wrong_shape};
@@ -238,16 +240,65 @@ pub fn sees(
     sees_directions(py, scene, places, &towards, distance, call)
 }
 
+/// Directions to the sun and lengths of steps: of positions, those by day, or of arrays.
+pub fn suns(
+    suns: &Bound<'_, PyAny>,
+    weights: Option<&Bound<'_, PyAny>>,
+    up: &str,
+) -> PyResult<(Vec<[f32; 3]>, Vec<f64>)> {
+    let py = suns.py();
+    let up = orientation(up, 0.0)?.up;
+    if !suns.hasattr("elevation")? {
+        let suns = directions(suns, "suns")?;
+        let Some(weights) = weights else {
+            let wanted = "weights: wanted the length of each step in hours, which directions do not say; \
+                          give what sun_positions returns, or weights=1 to count";
+            return Err(PyValueError::new_err(wanted));
+        };
+        let height = |sun: &[f32; 3]| {
+            (0..3)
+                .map(|axis| f64::from(sun[axis]) * up[axis])
+                .sum::<f64>()
+        };
+        let below = suns.iter().filter(|sun| height(sun) < 0.0).count();
+        if below > 0 {
+            let text = format!(
+                "suns: {below} of {} directions are below the horizon, and count; \
+                 give what sun_positions returns, or direction[sun.up]",
+                suns.len()
+            );
+            PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(text)?, 1)?;
+        }
+        let weights = each_of(weights, "weights", suns.len())?;
+        return Ok((suns, weights));
+    }
+    let day = suns.getattr("up")?;
+    let all = directions(&suns.getattr("direction")?, "suns.direction")?;
+    let is_day: Vec<bool> = day.extract()?;
+    let weights = match weights {
+        Some(weights) => each_of(weights, "weights", all.len())?,
+        None => each_of(&suns.getattr("hours")?, "suns.hours", all.len())?,
+    };
+    let steps = all.into_iter().zip(weights).zip(is_day);
+    let (directions, lengths): (Vec<_>, Vec<_>) = steps
+        .filter(|(_, is_day)| *is_day)
+        .map(|(step, _)| step)
+        .unzip();
+    if lengths.iter().any(|hours: &f64| hours.is_nan()) {
+        let wanted =
+            "weights: wanted the length of the step in hours, which a single time does not say";
+        return Err(PyValueError::new_err(wanted));
+    }
+    Ok((directions, lengths))
+}
+
 pub fn sun_hours<'py>(
     py: Python<'py>,
     scene: &SceneData,
     places: &Places,
-    suns: &Bound<'py, PyAny>,
-    weights: &Bound<'py, PyAny>,
+    (suns, weights): (Vec<[f32; 3]>, Vec<f64>),
     call: &mut Call<'_>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let suns = directions(suns, "sun_directions")?;
-    let weights = each_of(weights, "weights", suns.len())?;
     let Places {
         points,
         normals,

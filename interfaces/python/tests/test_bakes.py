@@ -2,6 +2,7 @@
 
 import datetime
 import pickle
+import warnings
 import zoneinfo
 
 import antumbra as am
@@ -73,7 +74,43 @@ def test_sun_hours_are_those_of_brute_force_in_numpy():
     assert sure.sum() > 30
     np.testing.assert_allclose(hours[sure], expected[sure], rtol=1e-12)
     np.testing.assert_allclose(facing[sure], above[sure], rtol=1e-12)
-    np.testing.assert_allclose(scene.sun_hours(points, None, suns)[sure] % 1, 0)
+    np.testing.assert_allclose(scene.sun_hours(points, None, suns, 1)[sure] % 1, 0)
+
+
+def test_positions_leave_out_the_night_and_know_their_steps():
+    field = am.Scene([[9, 9, -9], [9, 8, -9], [8, 9, -9]], [[0, 1, 2]])
+    times = np.datetime64("2025-06-21T00:05") + np.arange(144) * np.timedelta64(10, "m")
+    sun = am.sun_positions(48.2, 16.4, times, 1)
+    np.testing.assert_allclose(sun.hours, 1 / 6)
+    by_day = sun.up.sum() / 6
+    assert 15.5 < by_day < 16.5
+    for normals in (None, [0, 0, 1]):
+        np.testing.assert_allclose(field.sun_hours([0, 0, 0], normals, sun), by_day)
+        np.testing.assert_allclose(field.sun_hours([0, 0, 0], normals, sun, 1), sun.up.sum())
+    with pytest.warns(UserWarning, match=f"suns: {(~sun.up).sum()} of 144 directions are below the horizon"):
+        assert field.sun_hours([0, 0, 0], None, sun.direction, 1 / 6) > 23
+    upright = am.sun_positions(48.2, 16.4, times, 1, up="y")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        hours = field.sun_hours([0, 0, 0], None, upright.direction[upright.up], upright.hours[upright.up], up="y")
+        np.testing.assert_allclose(hours, by_day)
+    # Some hours of each of two days: the night between them is no step.
+    morning = np.datetime64("2025-06-21T08:00") + np.array([0, 1, 2, 24, 25]) * np.timedelta64(1, "h")
+    np.testing.assert_allclose(am.sun_positions(48.2, 16.4, morning, 1).hours, 1)
+    assert np.isnan(am.sun_positions(48.2, 16.4, morning[:1], 1).hours).all()
+
+
+def test_times_without_a_zone_warn_once(monkeypatch):
+    monkeypatch.setattr("antumbra._sun._is_warned", False)
+    with pytest.warns(UserWarning, match="taken as UTC"):
+        am.sun_positions(0, 0, "2024-03-20T12:00")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        am.sun_positions(0, 0, "2024-03-20T12:00")
+        monkeypatch.setattr("antumbra._sun._is_warned", False)
+        am.sun_positions(0, 0, "2024-03-20T12:00", "UTC")
+        am.sun_positions(0, 0, "2024-03-20T12:00Z")
+        am.sun_positions(0, 0, 1.7e9)
 
 
 def test_visibility_is_what_visible_says():
@@ -125,7 +162,7 @@ def test_points_on_the_ground_see_all_of_the_sky():
         assert scene.visible(points[:, None] + 5e5 * sky, points[:, None]).all()
         assert scene.visibility(points, points[0] + 5 * sky).to_numpy().all()
         assert scene.sees(points, None, sky).to_numpy().all()
-        np.testing.assert_array_equal(scene.sun_hours(points, None, sky), len(sky))
+        np.testing.assert_array_equal(scene.sun_hours(points, None, sky, 1), len(sky))
         bare = scene.visible(points[:, None], points[:, None] + 5 * sky, margin=0)
         assert 0.1 < bare.mean() < 0.9, "the surface hides its own points"
     level = am.Scene(corners, [[0, 1, 2], [0, 2, 3]])
@@ -200,7 +237,10 @@ def test_texels_lie_where_their_coordinates_are():
         (lambda: WALL.sky_view([0, 0, 0], patches=146), "patches: found 146"),
         (lambda: WALL.sky_view([0, 0, 0], up="x"), "up: found"),
         (lambda: WALL.sky_view([0, 0, 0], north=np.inf), "north: found inf"),
-        (lambda: WALL.sun_hours([0, 0, 0], None, [0, 0, 1]), r"sun_directions: found shape \(3,\), wanted \(k, 3\)"),
+        (lambda: WALL.sun_hours([0, 0, 0], None, [0, 0, 1]), r"suns: found shape \(3,\), wanted \(k, 3\)"),
+        (lambda: WALL.sun_hours([0, 0, 0], None, np.eye(3)), "weights: wanted the length of each step in hours"),
+        (lambda: WALL.sun_hours([0, 0, 0], None, am.sun_positions(0, 0, "2024-03-20T12:00", 0)), "which a single time does not say"),
+        (lambda: WALL.sun_hours(np.ma.array([[0, 0, 0]], mask=[[0, 1, 0]]), None, np.eye(3), 1), "points: 1 numbers are masked"),
         (lambda: WALL.sun_hours([0, 0, 0], None, np.eye(3), [1, 2]), r"weights: found shape \(2,\), wanted \(\) or \(3,\)"),
         (lambda: WALL.sensor_grid(0), "spacing: found 0"),
         (lambda: WALL.sensor_grid(1e-9), "100 million are the most"),

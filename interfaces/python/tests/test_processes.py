@@ -278,7 +278,7 @@ def test_cells_of_a_raster_may_be_cut_into_any_blocks_and_the_terrain_may_not():
     suns, eye = rng.normal(size=(40, 3)) * [1, 1, 0.2] + [0, 0, 0.4], terrain.bounds.mean(0) + [0, 0, 20]
     jobs = {
         "sky": lambda at, up: terrain.sky_view(at, up, threads=1),
-        "suns": lambda at, up: terrain.sun_hours(at, up, suns, threads=1),
+        "suns": lambda at, up: terrain.sun_hours(at, up, suns, 1, threads=1),
         "ao": lambda at, up: terrain.ambient_occlusion(at, up, 64, threads=1),
         "shade": lambda at, up: terrain.occluded(at + [0, 0, 0.01], suns[0], threads=1),
         "group": lambda at, up: terrain.occluded((at + [0, 0, 0.01])[:, :, None], suns, threads=1).sum(2),

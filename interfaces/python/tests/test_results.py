@@ -25,6 +25,12 @@ def matrix(rows, columns):
     return am.BitMatrix(words.reshape(rows, -(-columns // 64)), columns), answers
 
 
+def test_hits_are_several_arrays():
+    hits = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]]).intersect([0.2, 0.2, 0], [0, 0, 1])
+    with pytest.raises(TypeError, match="hits.t, hits.point"):
+        np.asarray(hits)
+
+
 @pytest.mark.parametrize("shape", [(5, 70), (3, 64), (4, 1), (1, 200), (0, 5), (5, 0)])
 def test_bits_are_a_bool_array(shape):
     bits, answers = matrix(*shape)

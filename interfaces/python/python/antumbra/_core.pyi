@@ -1,13 +1,13 @@
 # Types of the compiled part, written by hand. mypy's stubtest holds them against it.
 import os
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any, Literal, Protocol, final, overload
+from typing import Any, Literal, NoReturn, Protocol, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from typing_extensions import disjoint_base
 
-from . import Occluders
+from . import Occluders, SunPositions
 
 class _Bar(Protocol):
     def update(self, n: int, /) -> object: ...
@@ -271,9 +271,10 @@ class Queries:
         self,
         points: ArrayLike,
         normals: ArrayLike | None,
-        sun_directions: ArrayLike,
+        suns: SunPositions | ArrayLike,
         weights: ArrayLike | None = None,
         *,
+        up: _Up = "z",
         threads: int | None = None,
         progress: _Progress | None = None,
     ) -> NDArray[np.float64]: ...
@@ -422,6 +423,7 @@ class Hits:
     def along(self) -> NDArray[np.float32]: ...
     @property
     def shape(self) -> tuple[int, ...]: ...
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NoReturn: ...
     def __len__(self) -> int: ...
     def __getitem__(self, index: Any, /) -> Hits: ...
     def to_dict(self, *, point: bool = False, normal: bool = False) -> dict[str, NDArray[Any]]: ...

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable
 from datetime import datetime, timedelta, timezone, tzinfo
 from typing import Any, Literal, NamedTuple
@@ -19,7 +20,7 @@ class SunPositions(NamedTuple):
     Examples
     --------
     >>> import antumbra as am
-    >>> am.sun_positions(0, 0, "2024-03-20T12:00").direction.shape
+    >>> am.sun_positions(0, 0, "2024-03-20T12:00", "UTC").direction.shape
     (1, 3)
     """
 
@@ -29,6 +30,8 @@ class SunPositions(NamedTuple):
     """Angles above the horizon, -90 to 90 degrees."""
     direction: NDArray[np.float64]
     """Directions to the sun in the scene, of length 1: (k, 3)."""
+    hours: NDArray[np.float64]
+    """Length of the step of each time: the time to the next or the last one, whichever is nearer. NaN for a single time."""
 
     @property
     def up(self) -> NDArray[np.bool_]:
@@ -59,7 +62,7 @@ def sun_positions(
         keep it. Numbers are Unix times.
     timezone : float, str, tzinfo or None
         Hours ahead of UTC, a name such as ``"Europe/Rome"``, or a zone such as ``zoneinfo.ZoneInfo("Europe/Rome")``. None is
-        UTC. An hour that the clocks skip in spring counts as if they did not, and of one that they repeat, the first is meant.
+        UTC; the first times without a zone of their own that are taken so give a warning, which ``"UTC"`` avoids. An hour that the clocks skip in spring counts as if they did not, and of one that they repeat, the first is meant.
     height : float
         Metres above the sea.
     refraction : bool
@@ -70,7 +73,7 @@ def sun_positions(
     Returns
     -------
     SunPositions
-        Arrays ``azimuth``, ``elevation`` and ``direction``, one item for each time.
+        Arrays ``azimuth``, ``elevation``, ``direction`` and ``hours``, one item for each time.
 
     Raises
     ------
@@ -80,14 +83,23 @@ def sun_positions(
     Examples
     --------
     >>> import antumbra as am
-    >>> sun = am.sun_positions(51.5, 0.0, ["2024-06-21T12:00", "2024-06-21T23:59"])
+    >>> sun = am.sun_positions(51.5, 0.0, ["2024-06-21T12:00", "2024-06-21T23:59"], "UTC")
     >>> sun.up
     array([ True, False])
     >>> round(float(sun.elevation[0]), 1)
     61.9
     """
     unix = _unix(times, timezone)
-    return SunPositions(*_sun_positions(latitude, longitude, height, unix, refraction, up, north))
+    found = _sun_positions(latitude, longitude, height, unix, refraction, up, north)
+    return SunPositions(*found, _lengths(np.asarray(unix)))
+
+
+def _lengths(unix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Hours to the nearer one of the neighbours of each time."""
+    apart = np.full(len(unix) + 1, np.inf)
+    apart[1:-1] = np.abs(np.diff(unix))
+    nearest = np.minimum(apart[1:], apart[:-1])
+    return np.where(np.isinf(nearest), np.nan, nearest) / 3600.0
 
 
 class Irradiation(NamedTuple):
@@ -178,15 +190,19 @@ def irradiation(
 
 def _unix(times: Any, zone: float | str | tzinfo | None) -> list[float]:
     """Seconds since 1970 in UTC."""
-    zone = _zone(zone)
+    is_said, zone = zone is not None, _zone(zone)
     if isinstance(times, datetime | str):
         times = [times]
-    if isinstance(times, np.ndarray) and times.dtype.kind == "U":
-        times = times.tolist()
+    if hasattr(times, "__array__"):
+        times = np.atleast_1d(np.asarray(times))
+        if times.ndim == 1 and times.dtype.kind in "UO":
+            times = times.tolist()
     if isinstance(times, Iterable) and not isinstance(times, np.ndarray):
         times = list(times)
         if times and all(isinstance(time, datetime | str) for time in times):
             moments = [_moment(time, place) for place, time in enumerate(times)]
+            if not is_said and any(moment.tzinfo is None for moment in moments):
+                _warn_of_utc()
             return [_aware(time, zone).timestamp() for time in moments]
     array = np.atleast_1d(np.asarray(times))
     if array.ndim != 1:
@@ -198,12 +214,26 @@ def _unix(times: Any, zone: float | str | tzinfo | None) -> list[float]:
         raise TypeError(f"times: found dtype {array.dtype}, wanted datetime64, datetime, text or numbers")
     if np.isnat(array).any():
         raise ValueError("times: found NaT, wanted times")
+    if not is_said:
+        _warn_of_utc()
     seconds = array.astype("datetime64[us]").astype(np.int64) / 1e6
     if isinstance(zone, tzinfo):
         epoch = datetime(1970, 1, 1)
         local = (epoch + timedelta(seconds=float(second)) for second in seconds)
         return [_aware(time, zone).timestamp() for time in local]
     return [float(second) for second in seconds - 3600.0 * zone]
+
+
+def _warn_of_utc() -> None:
+    """Says once that times are taken as UTC."""
+    global _is_warned
+    if not _is_warned:
+        _is_warned = True
+        text = "times without a zone are taken as UTC: give timezone, such as 'Europe/Rome' or 'UTC'"
+        warnings.warn(text, stacklevel=4)
+
+
+_is_warned = False
 
 
 def _moment(time: datetime | str, place: int) -> datetime:

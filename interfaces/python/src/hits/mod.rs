@@ -177,7 +177,7 @@ fn gone() -> PyErr {
 /// >>> len(hits), hits.hit
 /// (2, array([ True, False]))
 /// >>> hits[hits.hit].point
-/// array([[0.19999999, 0.19999999, 1.        ]])
+/// array([[0.2, 0.2, 1. ]])
 #[pyclass(frozen, subclass, weakref, module = "antumbra")]
 pub struct Hits {
     arrays: Arrays,
@@ -517,6 +517,19 @@ impl Hits {
         Ok((
             slf.get_type().getattr("_restore")?,
             (slf.get().arrays.state(py),),
+        ))
+    }
+
+    /// Refuses ``np.asarray``: hits are several arrays.
+    #[pyo3(signature = (dtype=None, copy=None))]
+    fn __array__(
+        &self,
+        dtype: Option<&Bound<'_, PyAny>>,
+        copy: Option<bool>,
+    ) -> PyResult<Py<PyAny>> {
+        let _ = (dtype, copy);
+        Err(PyTypeError::new_err(
+            "Hits are several arrays: take one, such as hits.t, hits.point or hits.triangle",
         ))
     }
 

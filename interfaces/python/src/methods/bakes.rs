@@ -255,10 +255,13 @@ impl Queries {
     ///     Points.
     /// normals : array (..., 3) or None
     ///     As for ``sees``.
-    /// sun_directions : array (k, 3)
-    ///     Directions to the sun above the horizon, one for each step of time: see ``sun_positions``.
+    /// suns : SunPositions, or array (k, 3)
+    ///     What ``sun_positions`` returns, of which the steps by day count, or directions to the sun above the horizon.
     /// weights : float or array (k,), optional
-    ///     Length of each step in hours, or whatever else is to be added up: 1.
+    ///     Length of each step in hours, or whatever else is to be added up. Positions know the lengths of their steps; directions
+    ///     need weights.
+    /// up : {"z", "y"}
+    ///     Axis that points up. A warning counts directions below the horizon, which count like all others.
     /// threads : int, optional
     ///     Number of threads; see ``set_threads``.
     /// progress : optional
@@ -272,7 +275,8 @@ impl Queries {
     /// Raises
     /// ------
     /// ValueError, TypeError
-    ///     An argument has another shape or type, or shapes do not fit.
+    ///     An argument has another shape or type, shapes do not fit, or nothing says how long a step is: directions without
+    ///     weights, or a single time.
     ///
     /// Examples
     /// --------
@@ -280,23 +284,30 @@ impl Queries {
     /// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
     /// >>> scene.sun_hours([[0.2, 0.2, 0], [5, 5, 0]], None, [[0, 0, 1], [0, 1, 1]], weights=0.5)
     /// array([0.5, 1. ])
-    #[pyo3(signature = (points, normals, sun_directions, weights=None, *, threads=None, progress=None))]
+    ///
+    /// A whole day on an open field, in steps of an hour:
+    ///
+    /// >>> times = [f"2025-06-21T{hour:02}:30" for hour in range(24)]
+    /// >>> sun = am.sun_positions(48.2, 16.4, times, "Europe/Vienna")
+    /// >>> float(scene.sun_hours([5, 5, 0], [0, 0, 1], sun))
+    /// 16.0
+    #[pyo3(signature = (points, normals, suns, weights=None, *, up="z", threads=None, progress=None))]
     fn sun_hours<'py>(
         &self,
         py: Python<'py>,
         points: &Bound<'py, PyAny>,
         normals: Option<&Bound<'py, PyAny>>,
-        sun_directions: &Bound<'py, PyAny>,
+        suns: &Bound<'py, PyAny>,
         weights: Option<&Bound<'py, PyAny>>,
+        up: &str,
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
         let data = self.data();
         let places = Places::read(&data, points, normals)?;
         let mut call = Call::new(threads, progress)?;
-        let one = 1.0f64.into_pyobject(py)?.into_any();
-        let weights = weights.unwrap_or(&one);
-        bake::sun_hours(py, &data, &places, sun_directions, weights, &mut call)
+        let suns = bake::suns(suns, weights, up)?;
+        bake::sun_hours(py, &data, &places, suns, &mut call)
     }
 
     /// Irradiation of points by the sun and by the sky: see ``antumbra.irradiation``.
