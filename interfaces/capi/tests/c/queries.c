@@ -295,20 +295,23 @@ int main(void) {
             if (antumbra_is_hit(&hits[ray])) {
                 bool open;
                 uint8_t closed;
-                antumbra_ray short_ray = rays[ray], longer_ray;
-                short_ray.tfar = hits[ray].t * 0.99999f;
+                antumbra_ray short_ray = rays[ray], longer_ray = rays[ray];
+                uint32_t ends[2];
+                short_ray.tfar = hits[ray].t * 0.99f;
+                longer_ray.tfar = hits[ray].t * 1.01f;
                 OK(antumbra_occluded1(bvh, &short_ray, &open));
-                CHECK(!open);
-                longer_ray = short_ray;
-                while (!open) {
-                    uint32_t end;
-                    short_ray = longer_ray;
-                    memcpy(&end, &short_ray.tfar, sizeof end);
-                    ++end;
-                    memcpy(&longer_ray.tfar, &end, sizeof end);
-                    CHECK(longer_ray.tfar < hits[ray].t * 1.00001f);
-                    OK(antumbra_occluded1(bvh, &longer_ray, &open));
+                if (open) {
+                    continue;
                 }
+                memcpy(&ends[0], &short_ray.tfar, sizeof ends[0]);
+                memcpy(&ends[1], &longer_ray.tfar, sizeof ends[1]);
+                while (ends[1] - ends[0] > 1) {
+                    const uint32_t middle = ends[0] + (ends[1] - ends[0]) / 2;
+                    memcpy(&longer_ray.tfar, &middle, sizeof middle);
+                    OK(antumbra_occluded1(bvh, &longer_ray, &open));
+                    ends[open ? 1 : 0] = middle;
+                }
+                memcpy(&short_ray.tfar, &ends[0], sizeof ends[0]);
                 batch = antumbra_batch_of(&short_ray, 1);
                 batch.flags = ANTUMBRA_CLOSED | ANTUMBRA_THIS_THREAD;
                 OK(antumbra_occluded(bvh, &batch, &closed, 0));

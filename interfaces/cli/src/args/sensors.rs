@@ -56,7 +56,7 @@ pub struct PlaceArgs {
 /// Where north is, if the coordinate system does not say.
 #[derive(Debug, Args)]
 pub struct NorthArgs {
-    /// Angle from mesh to true north [default: by --crs]
+    /// Angle to true north [default: by --crs]
     ///
     /// Clockwise as seen from above: 90 where the x axis of a mesh with z up points north. If absent: the angle between grid north and
     /// true north in the coordinate system of the scene (--crs, or the one in a GeoTIFF), or else 0.
@@ -82,7 +82,7 @@ impl NorthArgs {
 /// Unit of the scene, if the coordinate system does not say.
 #[derive(Debug, Args)]
 pub struct UnitArgs {
-    /// mm, cm, m, km, in or ft [default: by --crs, or m]
+    /// Unit, as mm, m or ft [default: by --crs, or m]
     ///
     /// If absent: the unit of the coordinate system of the scene (--crs, or the one in a GeoTIFF), or else metres.
     #[arg(long, value_enum, value_name = "UNIT", hide_possible_values = true)]
@@ -120,9 +120,9 @@ pub struct PlacementArgs {
     /// the column surface with roof, ground, facade or underside.
     #[arg(long, value_name = "METRES", group = "where", value_parser = values::positive)]
     pub surfaces: Option<f64>,
-    /// Only on roof, ground, facade, underside, covered
+    /// Only on roof, ground, facade and so on
     ///
-    /// Facades are more than 60 degrees from up and down. Of surfaces that face up, roofs belong to buildings, and ground does not.
+    /// Kinds are roof, ground, facade, underside and covered. Facades are more than 60 degrees from up and down. Of surfaces that face up, roofs belong to buildings, and ground does not.
     /// Places that are covered, as inside of houses, are none of these: see --covered. Several are separated by commas.
     #[arg(long, value_name = "KINDS", requires = "surfaces", value_delimiter = ',', value_parser = surface)]
     pub on: Vec<Surface>,
@@ -135,7 +135,7 @@ pub struct PlacementArgs {
         allow_negative_numbers = true
     )]
     pub offset: f64,
-    /// What is so close below a surface is covered
+    /// Distance at which a floor covers
     ///
     /// As a floor covers the terrain. Places that see no sky are covered if the first surface above is nearer than this, or if they
     /// are inside of a body. Places below balconies, bridges and trees are not covered, only shaded.

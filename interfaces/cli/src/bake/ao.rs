@@ -129,10 +129,6 @@ pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Res
     scenes::apply_pose(&mut ground.loaded, &args.pose)?;
     scenes::tell_read(&ground.loaded, args.pose.up);
     ground.split_at_creases()?;
-    // A raster faces up, and what is seen from both sides may face as it likes.
-    if !args.two_sided && !raster::is_raster(&args.scene) {
-        ground.turn_bodies();
-    }
     let target = match (format, args.atlas) {
         (Format::Picture, Some(size)) => Target::Texels(atlas(&ground, size)?),
         (Format::Picture, None) => Target::Pixels(View::new(&ground)?),

@@ -95,13 +95,6 @@ impl Ground {
         Ok(())
     }
 
-    /// Turns closed bodies outwards, and says how many. For bakes that look from both sides of what is open.
-    pub fn turn_bodies(&mut self) {
-        let objects = self.parts.objects(&self.mesh).numbers();
-        let bodies = self.mesh.orient(&objects);
-        self.tell_turned(bodies.turned, 0);
-    }
-
     /// Turns surfaces to the side that people mean, and says how many.
     pub fn face(&mut self, plan: &Orientation) {
         let objects = self.parts.objects(&self.mesh).numbers();

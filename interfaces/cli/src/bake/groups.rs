@@ -216,6 +216,9 @@ impl Cover {
     }
 }
 
+/// Squares of a group below which the shape of its parts decides how many of them have a sensor.
+const MANY: f64 = 100.0;
+
 impl Baked<'_> {
     /// Warns of groups whose sensors stand for another area than they have.
     fn check_areas(&self, groups: &Groups, cover: &Cover, areas: &[f64], square: f64) {
@@ -224,7 +227,9 @@ impl Baked<'_> {
                 let area = cover.places[group] as f64 * square;
                 // About so much hangs on where the lattice begins.
                 let edge = (square * areas[group]).sqrt();
-                cover.places[group] > 0 && (area - areas[group]).abs() > 0.1 * areas[group] + edge
+                cover.places[group] > 0
+                    && areas[group] > MANY * square
+                    && (area - areas[group]).abs() > 0.1 * areas[group] + edge
             })
             .map(|group| {
                 let (name, area) = (groups.names[group].join(" "), areas[group]);

@@ -579,7 +579,7 @@ fn the_page_stands_alone() {
         "study",
         name,
         "--orders",
-        "simple,sort,sort+",
+        "simple,sort-,sort,sort+",
         "--replay",
         "300",
         "--out",
