@@ -374,6 +374,9 @@ mod tests {
     use super::*;
     use crate::{Placement, Sensors};
 
+    /// A point and its normal.
+    type Place = ([f32; 3], [f32; 3]);
+
     /// A scene of boxes and level sheets.
     #[derive(Clone, Default)]
     struct Town(Mesh);
@@ -405,7 +408,7 @@ mod tests {
         }
 
         /// Numbers of sensors of each kind, a square metre each; and their points and normals.
-        fn sensors(&self) -> ([usize; 5], Vec<([f32; 3], [f32; 3])>, Surfaces) {
+        fn sensors(&self) -> ([usize; 5], Vec<Place>, Surfaces) {
             let mut mesh = self.0.clone();
             let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
             let bvh = Bvh::build(&geometry, &Recipe::default()).expect("a tree");
@@ -428,7 +431,7 @@ mod tests {
                     .expect("sensors");
             let names = &found.labels[0].values;
             let count = |kind: Surface| names.iter().filter(|name| *name == kind.name()).count();
-            let mut places: Vec<_> = found.points.into_iter().zip(found.normals).collect();
+            let mut places: Vec<Place> = found.points.into_iter().zip(found.normals).collect();
             places.sort_by(|a, b| a.partial_cmp(b).expect("numbers"));
             (Surface::ALL.map(count), places, surfaces)
         }
