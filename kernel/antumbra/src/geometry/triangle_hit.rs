@@ -119,7 +119,7 @@ impl ShearedTriangle {
 
 /// What is reported of a hit on a triangle with these corners, decided at the distance `t`: distance and barycentrics in
 /// double precision, see above. Ray and corners are in the same space.
-#[inline(always)]
+#[inline(never)]
 pub(crate) fn refined(corners: &[[f32; 3]; 3], ray: &Ray, t: f32) -> [f32; 3] {
     let [a, b, c] = corners.map(|corner| corner.map(f64::from));
     let from_a = |[x, y, z]: [f64; 3]| [x - a[0], y - a[1], z - a[2]];
@@ -128,15 +128,17 @@ pub(crate) fn refined(corners: &[[f32; 3]; 3], ray: &Ray, t: f32) -> [f32; 3] {
     let (n, r) = (cross(e, f), cross(s, dir));
     let per = 1.0 / dot(dir, n);
     let exact = (-dot(s, n) * per) as f32 + 0.0;
+    let t = match (ray.tnear < exact) & (exact < ray.tfar) {
+        true => exact,
+        false => t,
+    };
     let [u, v] = [-dot(f, r) * per, dot(e, r) * per];
     let is_inside = (u >= 0.0) & (v >= 0.0) & (u + v <= 1.0);
     let [u, v] = match is_inside {
         true => [u, v],
-        // Wherever the interval ends.
-        false => nearest(corners, ray, if exact.is_finite() { exact } else { t }),
+        false => nearest(corners, ray, t),
     };
-    let is_there = (ray.tnear < exact) & (exact < ray.tfar);
-    [if is_there { exact } else { t }, u as f32, v as f32]
+    [t, u as f32, v as f32]
 }
 
 /// The weights of the point of a triangle that is nearest to the point of a ray at a distance.

@@ -211,9 +211,11 @@ fn closed_intervals_hold_their_ends() {
         // The distance that decides is a few units in the last place from the one that is reported.
         let near =
             (-64..=64).map(|step: i32| f32::from_bits(hit.t.to_bits().wrapping_add_signed(step)));
-        let lies_before = |tfar: f32| bvh.occluded(&Ray { tfar, ..*ray });
-        let decides = |t: &f32| lies_before(t.next_up()) && !lies_before(*t);
-        let Some(t) = near.into_iter().find(decides) else {
+        let is_reached = |t: &f32| {
+            let tfar = t.next_up();
+            bvh.occluded(&Ray { tfar, ..*ray })
+        };
+        let Some(t) = near.into_iter().find(is_reached) else {
             continue;
         };
         for (tnear, tfar) in [(here, t), (t, ray.tfar), (t, t)] {
