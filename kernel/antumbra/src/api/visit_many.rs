@@ -8,7 +8,6 @@ use core::sync::atomic::{AtomicUsize, Ordering};
 
 use super::batch::Batch;
 use super::bvh::Bvh;
-use crate::geometry::best::TreeHit;
 use crate::parallel::for_each;
 use crate::ray::{Hit, Ray};
 use crate::trace::memory::Memory;
@@ -102,7 +101,7 @@ impl Batch<'_> {
             return;
         }
         let mut visited = 0;
-        let mut goes_on = |place: usize, hit: &TreeHit| {
+        let mut goes_on = |place: usize, hit: &Hit| {
             visited += 1;
             visit(&mut states[place], hit.told()) == Visit::Reject
         };
@@ -114,10 +113,7 @@ impl Batch<'_> {
             let batch = open.batch().under(self.conditions());
             let batch = batch.reporting(Report::Surface(&report));
             bvh.intersect_many(memory, &batch, &mut closest);
-            open.retain(|index, place| {
-                let found = found[index].filter(|found| goes_on(place, found))?;
-                Some(found.hit)
-            });
+            open.retain(|index, place| found[index].filter(|hit| goes_on(place, hit)));
         }
         let mut lists = vec![NearestHits::default(); open.rays.len()];
         let pending: Vec<u32> = (0..lists.len() as u32).collect();
@@ -129,7 +125,7 @@ impl Batch<'_> {
             open.retain(|index, place| {
                 let list = &lists[index];
                 let is_open = list.hits().iter().all(|hit| goes_on(place, hit));
-                list.last().filter(|_| is_open).map(|last| last.hit)
+                list.last().filter(|_| is_open)
             });
         }
         so_far.add(len, visited);

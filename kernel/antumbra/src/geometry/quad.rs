@@ -7,7 +7,6 @@
 //! one on the quad.
 
 use crate::geometry::PrimRef;
-use crate::geometry::best::TreeHit;
 use crate::geometry::primitives::dropped::DropReason;
 use crate::geometry::sound::{is_finite, is_sound};
 use crate::ray::{Hit, INVALID_ID};
@@ -85,36 +84,36 @@ impl PrimRef {
     }
 }
 
-impl TreeHit {
+impl Hit {
     /// The hit as the user knows it, unless it is still [`Hit::none`].
-    pub fn reported(&self) -> Option<Hit> {
-        (self.hit.prim_id != INVALID_ID).then(|| self.told())
+    pub(crate) fn found(&self) -> Option<Self> {
+        match self.prim_id {
+            ..FIRST_HALF => Some(*self),
+            INVALID_ID => None,
+            _ => Some(self.on_quad()),
+        }
     }
 
     /// The hit as the user knows it.
     #[inline(always)]
-    pub fn told(self) -> Hit {
-        let hit = Hit {
-            t: self.t,
-            ..self.hit
-        };
-        if hit.prim_id < FIRST_HALF {
-            hit
+    pub(crate) fn told(self) -> Self {
+        if self.prim_id < FIRST_HALF {
+            self
         } else {
-            on_quad(hit)
+            self.on_quad()
         }
     }
-}
 
-/// A hit on a half as one on its quad.
-#[inline(never)]
-fn on_quad(hit: Hit) -> Hit {
-    let [u, v] = told_uv(hit.prim_id, [hit.u, hit.v]);
-    Hit {
-        u,
-        v,
-        prim_id: told_id(hit.prim_id),
-        ..hit
+    /// A hit on a half as one on its quad.
+    #[inline(never)]
+    pub(crate) fn on_quad(self) -> Self {
+        let [u, v] = told_uv(self.prim_id, [self.u, self.v]);
+        Self {
+            u,
+            v,
+            prim_id: told_id(self.prim_id),
+            ..self
+        }
     }
 }
 

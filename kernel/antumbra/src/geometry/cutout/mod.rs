@@ -12,7 +12,7 @@ use alloc::sync::Arc;
 use antumbra_simd::Simd;
 
 use crate::aabb::Aabb;
-use crate::geometry::best::{Best, TreeHit};
+use crate::geometry::best::Best;
 use crate::geometry::cutout::join::Joined;
 use crate::geometry::cutout::micromap::{MapRef, MicroMaps};
 use crate::geometry::cutout::opacity::{Opacity, QueryKind, accepts};
@@ -154,16 +154,10 @@ impl LeafBlock for CutoutBlock {
         self.triangles.candidates::<S, STREAM>(simd, ray, limit)
     }
 
-    fn hit(
-        &self,
-        lane: usize,
-        ray: &RaySetup,
-        filters: &Filters,
-        query: QueryKind,
-    ) -> Option<TreeHit> {
+    fn hit(&self, lane: usize, ray: &RaySetup, filters: &Filters, query: QueryKind) -> Option<Hit> {
         let values = self.triangles.values(lane, ray)?;
         let counts = CutoutHit::new(self, lane, values, filters).counts(query, ray, filters);
-        counts.then(|| self.triangles.refined_hit(lane, ray, values[0]))
+        counts.then(|| self.triangles.hit_at(lane, values))
     }
 
     #[inline(never)]
@@ -218,7 +212,7 @@ impl LeafBlock for CutoutBlock {
 pub(crate) struct CutoutHit<'a> {
     pub block: &'a CutoutBlock,
     pub lane: usize,
-    /// `t`, `u` and `v` that decide.
+    /// `t`, `u` and `v`.
     pub values: [f32; 3],
     /// See [`CutoutBlock::part`].
     pub part: usize,
@@ -245,17 +239,18 @@ impl<'a> CutoutHit<'a> {
         known.unwrap_or_else(|| self.block.ask(self.lane, [u, v], query, ray, filters))
     }
 
+    /// The hit, if it counts.
+    #[inline(always)]
+    pub fn hit(&self) -> Hit {
+        self.block.triangles.hit_at(self.lane, self.values)
+    }
+
     /// Replaces `best` by this hit if it counts and precedes it, and returns whether it did. The filter costs the most,
     /// so it is called last.
     #[inline(always)]
     pub fn improves(&self, best: &mut Best, ray: &RaySetup, filters: &Filters) -> bool {
-        let (triangles, lane, t) = (&self.block.triangles, self.lane, self.values[0]);
-        let improved = best.offer_if(triangles.hit_at(lane, t), |_| {
+        best.offer_if(self.hit(), |_| {
             self.counts(QueryKind::Intersect, ray, filters)
-        });
-        if improved {
-            best.refine(triangles.refined(lane, ray, t));
-        }
-        improved
+        })
     }
 }
