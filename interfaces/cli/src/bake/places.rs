@@ -54,8 +54,9 @@ impl Places {
             }
             None => level,
         };
-        // A grid is turned to whoever looks at it, and a table has normals of its own.
-        if args.placement.surfaces.is_some() || args.vertices {
+        // A grid is turned to whoever looks at it, a table has normals of its own, and a raster faces up.
+        let has_sides = args.vertices && ground.loaded.raster.is_none();
+        if args.placement.surfaces.is_some() || has_sides {
             ground.face(&level);
         }
         let ground = &*ground;
