@@ -177,7 +177,7 @@ fn gone() -> PyErr {
 /// >>> len(hits), hits.hit
 /// (2, array([ True, False]))
 /// >>> hits[hits.hit].point
-/// array([[0.19999999, 0.19999999, 1.        ]])
+/// array([[0.2, 0.2, 1. ]])
 #[pyclass(frozen, subclass, weakref, module = "antumbra")]
 pub struct Hits {
     arrays: Arrays,

@@ -105,8 +105,9 @@ impl<'a> Build<'a> {
         Self { times, ..self }
     }
 
-    /// With a monitor, which receives the progress of the build and may stop it. It is queried every few milliseconds, but
-    /// not while primitives are copied and nodes written: these steps take a few tenths of a second for a million triangles.
+    /// With a monitor, which receives the progress of the build and may stop it. It is queried every few milliseconds while the
+    /// first tree grows and rays are followed. Copying primitives, a round of the collapse and writing nodes are not
+    /// interrupted, and take one or two tenths of a second each for a million triangles.
     pub fn monitor(self, monitor: &'a dyn BuildMonitor) -> Self {
         Self { monitor, ..self }
     }

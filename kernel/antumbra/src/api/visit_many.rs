@@ -8,6 +8,7 @@ use core::sync::atomic::{AtomicUsize, Ordering};
 
 use super::batch::Batch;
 use super::bvh::Bvh;
+use crate::geometry::best::TreeHit;
 use crate::parallel::for_each;
 use crate::ray::{Hit, Ray};
 use crate::trace::memory::Memory;
@@ -101,7 +102,7 @@ impl Batch<'_> {
             return;
         }
         let mut visited = 0;
-        let mut goes_on = |place: usize, hit: &Hit| {
+        let mut goes_on = |place: usize, hit: &TreeHit| {
             visited += 1;
             visit(&mut states[place], hit.told()) == Visit::Reject
         };
@@ -113,7 +114,10 @@ impl Batch<'_> {
             let batch = open.batch().under(self.conditions());
             let batch = batch.reporting(Report::Surface(&report));
             bvh.intersect_many(memory, &batch, &mut closest);
-            open.retain(|index, place| found[index].filter(|hit| goes_on(place, hit)));
+            open.retain(|index, place| {
+                let found = found[index].filter(|found| goes_on(place, found))?;
+                Some(found.hit)
+            });
         }
         let mut lists = vec![NearestHits::default(); open.rays.len()];
         let pending: Vec<u32> = (0..lists.len() as u32).collect();
@@ -125,7 +129,7 @@ impl Batch<'_> {
             open.retain(|index, place| {
                 let list = &lists[index];
                 let is_open = list.hits().iter().all(|hit| goes_on(place, hit));
-                list.last().filter(|_| is_open)
+                list.last().filter(|_| is_open).map(|last| last.hit)
             });
         }
         so_far.add(len, visited);

@@ -6,7 +6,7 @@
 use antumbra_simd::Simd;
 
 use crate::aabb::Aabb;
-use crate::geometry::best::Best;
+use crate::geometry::best::{Best, TreeHit};
 use crate::geometry::cutout::Filters;
 use crate::geometry::cutout::join::Joined;
 use crate::geometry::moved::Moved;
@@ -69,7 +69,13 @@ pub(crate) trait LeafBlock: Clone + Send + Sync {
     ) -> LanesOf;
 
     /// The hit in a lane, if it counts.
-    fn hit(&self, lane: usize, ray: &RaySetup, filters: &Filters, query: QueryKind) -> Option<Hit>;
+    fn hit(
+        &self,
+        lane: usize,
+        ray: &RaySetup,
+        filters: &Filters,
+        query: QueryKind,
+    ) -> Option<TreeHit>;
 
     /// Whether there is such a hit for an occlusion query.
     #[inline(always)]

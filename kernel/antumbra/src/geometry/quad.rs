@@ -7,6 +7,7 @@
 //! one on the quad.
 
 use crate::geometry::PrimRef;
+use crate::geometry::best::TreeHit;
 use crate::geometry::primitives::dropped::DropReason;
 use crate::geometry::sound::{is_finite, is_sound};
 use crate::ray::{Hit, INVALID_ID};
@@ -84,36 +85,36 @@ impl PrimRef {
     }
 }
 
-impl Hit {
+impl TreeHit {
     /// The hit as the user knows it, unless it is still [`Hit::none`].
-    pub(crate) fn found(&self) -> Option<Self> {
-        match self.prim_id {
-            ..FIRST_HALF => Some(*self),
-            INVALID_ID => None,
-            _ => Some(self.on_quad()),
-        }
+    pub fn reported(&self) -> Option<Hit> {
+        (self.hit.prim_id != INVALID_ID).then(|| self.told())
     }
 
     /// The hit as the user knows it.
     #[inline(always)]
-    pub(crate) fn told(self) -> Self {
-        if self.prim_id < FIRST_HALF {
-            self
+    pub fn told(self) -> Hit {
+        let hit = Hit {
+            t: self.t,
+            ..self.hit
+        };
+        if hit.prim_id < FIRST_HALF {
+            hit
         } else {
-            self.on_quad()
+            on_quad(hit)
         }
     }
+}
 
-    /// A hit on a half as one on its quad.
-    #[inline(never)]
-    pub(crate) fn on_quad(self) -> Self {
-        let [u, v] = told_uv(self.prim_id, [self.u, self.v]);
-        Self {
-            u,
-            v,
-            prim_id: told_id(self.prim_id),
-            ..self
-        }
+/// A hit on a half as one on its quad.
+#[inline(never)]
+fn on_quad(hit: Hit) -> Hit {
+    let [u, v] = told_uv(hit.prim_id, [hit.u, hit.v]);
+    Hit {
+        u,
+        v,
+        prim_id: told_id(hit.prim_id),
+        ..hit
     }
 }
 

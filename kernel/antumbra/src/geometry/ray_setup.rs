@@ -37,12 +37,13 @@
 //!   the interval of a sphere. The box follows from the primitives and the transform (see
 //!   [`crate::geometry::instance`]). The instance is missed unless the instance interval shares a point with the open
 //!   interval of the ray.
-//! - A hit in the object at `t` is reported at `t` clamped into the instance interval. The clamped distance lies in the
-//!   interval of the ray, because `t` does and both intervals share a point. Hits are ranked by the distances reported,
-//!   then by ids.
+//! - A hit in the object at `t` counts as one at `t` clamped into the instance interval. The clamped distance lies in the
+//!   interval of the ray, because `t` does and both intervals share a point. Hits are ranked by the clamped distances,
+//!   then by ids. What is reported of a triangle follows from nothing but the ray in the object, so the box has no say in it:
+//!   see [`crate::geometry::triangle_hit`].
 //!
 //! In the world the box of the instance takes the place of a sphere's: every node above it is entered
-//! at or before the instance interval, so no tree can lose the instance, nor, among closest hits, one that is reported
+//! at or before the instance interval, so no tree can lose the instance, nor, among closest hits, one that counts
 //! in that interval. In the object, a node is entered at or before the `t` of what is below it, before that is
 //! clamped. Let `b` be the best distance so far. As long as `b` is less than the end of the instance interval, a hit of
 //! use has a `t` of at most `b`: clamped down to the end it would come after `b`, and clamping up moves it away.

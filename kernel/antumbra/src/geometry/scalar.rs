@@ -8,7 +8,7 @@ use core::fmt::Debug;
 use antumbra_simd::{Scalar, Simd};
 
 use crate::aabb::Aabb;
-use crate::geometry::best::Best;
+use crate::geometry::best::{Best, TreeHit};
 use crate::geometry::cutout::Filters;
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::leaf_block::{InBlock, LeafBlock, Normal};
@@ -136,17 +136,17 @@ impl<P: ScalarPrim> ScalarBlock<P> {
     }
 
     /// The hit in a lane, unless it cannot be nearer than `limit`.
-    fn hit_within(&self, lane: usize, ray: &RaySetup, limit: f32) -> Option<Hit> {
+    fn hit_within(&self, lane: usize, ray: &RaySetup, limit: f32) -> Option<TreeHit> {
         let PrimRef { geom_id, prim_id } = self.refs[lane];
         let [t, u, v] = self.prims[lane].hit(prim_id, ray, limit)?;
-        Some(Hit {
+        Some(TreeHit::from(Hit {
             t,
             u,
             v,
             prim_id,
             geom_id,
             inst_id: INVALID_ID,
-        })
+        }))
     }
 }
 
@@ -198,7 +198,7 @@ impl<P: ScalarPrim> LeafBlock for ScalarBlock<P> {
         LanesOf(P::candidates(simd, &self.prims, self.count, ray))
     }
 
-    fn hit(&self, lane: usize, ray: &RaySetup, _: &Filters, _: QueryKind) -> Option<Hit> {
+    fn hit(&self, lane: usize, ray: &RaySetup, _: &Filters, _: QueryKind) -> Option<TreeHit> {
         self.hit_within(lane, ray, ray.tfar)
     }
 

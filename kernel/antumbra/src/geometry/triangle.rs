@@ -6,7 +6,7 @@
 use antumbra_simd::{Lanes, Mask, Scalar, Simd, Width};
 
 use crate::aabb::Aabb;
-use crate::geometry::best::Best;
+use crate::geometry::best::{Best, TreeHit};
 use crate::geometry::cutout::Filters;
 use crate::geometry::edge_test::{Corners, Edges, Ends, Shear, Verdict};
 use crate::geometry::instance::cross;
@@ -15,7 +15,7 @@ use crate::geometry::moved::Moved;
 use crate::geometry::nearest::{Near, Place};
 use crate::geometry::primitives::{PrimKind, Primitives};
 use crate::geometry::ray_setup::RaySetup;
-use crate::geometry::triangle_hit::ShearedTriangle;
+use crate::geometry::triangle_hit::{ShearedTriangle, refined};
 use crate::geometry::winding::crossing;
 use crate::geometry::{BLOCK, PrimRef, QueryKind};
 use crate::ray::{Hit, INVALID_ID, Ray};
@@ -164,13 +164,22 @@ impl TriangleBlock {
         ShearedTriangle::new(&self.corners_of(lane, axes), &ray.sheared())
     }
 
-    /// `t`, `u` and `v` where the ray hits the triangle of a lane.
+    /// `t`, `u` and `v` that decide whether the ray hits the cut-out of a lane.
     #[inline(always)]
     pub fn values(&self, lane: usize, ray: &RaySetup) -> Option<[f32; 3]> {
         let seen = self.seen(lane, ray);
         let t = seen.distance(&ray.sheared())?;
-        let [u, v] = seen.barycentrics();
+        let [u, v] = seen.barycentrics().unwrap_or_else(|| {
+            let [_, u, v] = self.refined(lane, ray, t);
+            [u, v]
+        });
         Some([t, u, v])
+    }
+
+    /// `t`, `u` and `v` that are reported of a hit in a lane, decided at the distance `t`.
+    #[inline(always)]
+    pub fn refined(&self, lane: usize, ray: &Ray, t: f32) -> [f32; 3] {
+        refined(&self.triangle(lane), ray, t)
     }
 
     /// Lanes whose triangles are hit, among `lanes`.
@@ -221,17 +230,23 @@ impl TriangleBlock {
         }
     }
 
-    /// The hit in a lane at these `t`, `u` and `v`.
+    /// The hit in a lane, decided at the distance `t`, that is still to be refined.
     #[inline(always)]
-    pub fn hit_at(&self, lane: usize, [t, u, v]: [f32; 3]) -> Hit {
-        Hit {
+    pub fn hit_at(&self, lane: usize, t: f32) -> TreeHit {
+        TreeHit::from(Hit {
             t,
-            u,
-            v,
+            u: 0.0,
+            v: 0.0,
             prim_id: self.prim_ids[lane],
             geom_id: self.geom_ids[lane],
             inst_id: INVALID_ID,
-        }
+        })
+    }
+
+    /// [`TriangleBlock::hit_at`], refined.
+    #[inline(always)]
+    pub fn refined_hit(&self, lane: usize, ray: &Ray, t: f32) -> TreeHit {
+        (self.hit_at(lane, t)).refined(self.refined(lane, ray, t))
     }
 }
 
@@ -304,8 +319,9 @@ impl LeafBlock for TriangleBlock {
     }
 
     #[inline(always)]
-    fn hit(&self, lane: usize, ray: &RaySetup, _: &Filters, _: QueryKind) -> Option<Hit> {
-        Some(self.hit_at(lane, self.values(lane, ray)?))
+    fn hit(&self, lane: usize, ray: &RaySetup, _: &Filters, _: QueryKind) -> Option<TreeHit> {
+        let t = self.seen(lane, ray).distance(&ray.sheared())?;
+        Some(self.refined_hit(lane, ray, t))
     }
 
     #[inline(always)]
@@ -328,21 +344,20 @@ impl LeafBlock for TriangleBlock {
 
     #[inline(always)]
     fn improve(&self, lanes: LanesOf, ray: &RaySetup, _: &Filters, best: &mut Best) -> bool {
-        let mut improved = false;
+        let mut improved = None;
         for lane in lanes {
-            let seen = self.seen(lane, ray);
-            let Some(t) = seen.distance(&ray.sheared()) else {
+            let Some(t) = self.seen(lane, ray).distance(&ray.sheared()) else {
                 continue;
             };
-            if t <= best.limit
-                && let Some(hit) = best.preceded_by(self.hit_at(lane, [t, 0.0, 0.0]))
-            {
-                let [u, v] = seen.barycentrics();
-                best.take(Hit { u, v, ..hit });
-                improved = true;
+            if t <= best.limit && best.offer(self.hit_at(lane, t)) {
+                improved = Some((lane, t));
             }
         }
-        improved
+        // Only the last of them may be reported.
+        if let Some((lane, t)) = improved {
+            best.refine(self.refined(lane, ray, t));
+        }
+        improved.is_some()
     }
 
     fn corners(&self, lane: usize) -> Option<[[f32; 3]; 3]> {
@@ -383,13 +398,15 @@ impl LeafBlock for TriangleBlock {
     }
 }
 
-/// The test of one triangle, for the oracle: `t`, `u` and `v`.
-pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<[f32; 3]> {
-    let corners = ray
+/// The test of one triangle, for the oracle: `t`, `u` and `v` that decide, and those that are reported.
+pub(crate) fn hit(corners: &[[f32; 3]; 3], ray: &RaySetup) -> Option<[[f32; 3]; 2]> {
+    let sheared = ray
         .axes
         .map(|axis| corners.map(|corner| corner[axis as usize]));
-    let seen = ShearedTriangle::new(&corners, &ray.sheared());
+    let seen = ShearedTriangle::new(&sheared, &ray.sheared());
     let t = seen.distance(&ray.sheared())?;
-    let [u, v] = seen.barycentrics();
-    Some([t, u, v])
+    let refined = refined(corners, ray, t);
+    let [_, u, v] = refined;
+    let [u, v] = seen.barycentrics().unwrap_or([u, v]);
+    Some([[t, u, v], refined])
 }

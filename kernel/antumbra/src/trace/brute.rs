@@ -7,7 +7,7 @@ use alloc::vec::Vec;
 use antumbra_simd::Scalar;
 
 use crate::geometry::QueryKind;
-use crate::geometry::best::Best;
+use crate::geometry::best::{Best, TreeHit};
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::masks::SceneMasks;
 use crate::geometry::primitives::Primitives;
@@ -111,11 +111,8 @@ impl Brute {
                 add_hits(primitives, &object, interval, &mut hits);
             }
         }
-        hits.sort_by_key(|hit| Ranked(*hit));
-        for hit in &mut hits {
-            *hit = hit.told();
-        }
-        hits
+        hits.sort_by_key(|found| Ranked(*found));
+        hits.into_iter().map(TreeHit::told).collect()
     }
 
     /// Whether any hit that fulfils a condition occludes a ray.
@@ -130,14 +127,7 @@ impl Brute {
                     return hit.is_some_and(|id| condition.may_count(named(id, ray)));
                 }
                 let hit = primitives.hit(index, ray, QueryKind::Occluded);
-                hit.is_some_and(|hit| {
-                    let hit = Hit {
-                        t: interval.clamp(hit.t),
-                        inst_id: ray.inst_id,
-                        ..hit
-                    };
-                    condition.counts(&hit.told())
-                })
+                hit.is_some_and(|hit| condition.counts(&hit.placed(interval, ray.inst_id).told()))
             })
         };
         let mut object = RaySetup::IDLE;
@@ -156,14 +146,10 @@ fn any_hit(primitives: &Primitives, ray: &RaySetup) -> bool {
 }
 
 /// Adds all hits of the ray with the primitives, instances aside, at the distances at which they are reported.
-fn add_hits(primitives: &Primitives, ray: &RaySetup, interval: Interval, hits: &mut Vec<Hit>) {
+fn add_hits(primitives: &Primitives, ray: &RaySetup, interval: Interval, hits: &mut Vec<TreeHit>) {
     for index in 0..primitives.len() {
         if let Some(hit) = primitives.hit(index, ray, QueryKind::Intersect) {
-            hits.push(Hit {
-                t: interval.clamp(hit.t),
-                inst_id: ray.inst_id,
-                ..hit
-            });
+            hits.push(hit.placed(interval, ray.inst_id));
         }
     }
 }

@@ -7,7 +7,7 @@
 //! Which it is, is a type, [`Query::CONDITIONAL`](crate::trace::query::Query::CONDITIONAL): a flag that streams look at costs
 //! those that have no condition 13 %. What is here is compiled once for all levels and widths, away from the loops.
 
-use crate::geometry::best::Best;
+use crate::geometry::best::{Best, TreeHit};
 use crate::geometry::cutout::Filters;
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::leaf_block::LeafBlock;
@@ -46,13 +46,13 @@ impl Owner<'_> {
 /// The best hits of a ray so far.
 pub(crate) trait Takes {
     /// Takes a hit, where the ray is now, if it is among the best and counts, which is owner last. Whether it did.
-    fn offer_if(&mut self, hit: Hit, counts: impl FnOnce(&Hit) -> bool) -> bool;
+    fn offer_if(&mut self, found: TreeHit, counts: impl FnOnce(&TreeHit) -> bool) -> bool;
 }
 
 impl Takes for Best {
     #[inline(always)]
-    fn offer_if(&mut self, hit: Hit, counts: impl FnOnce(&Hit) -> bool) -> bool {
-        Self::offer_if(self, hit, counts)
+    fn offer_if(&mut self, found: TreeHit, counts: impl FnOnce(&TreeHit) -> bool) -> bool {
+        Self::offer_if(self, found, counts)
     }
 }
 
@@ -78,8 +78,8 @@ pub(crate) fn offer<B: LeafBlock>(
 }
 
 /// Whether a hit on a primitive that may count, with ids as in the tree and as it is reported, counts.
-pub(crate) fn counts(hit: &Hit, condition: &Condition<'_>) -> bool {
-    condition.is_behind(hit) && condition.accept.is_none_or(|accept| accept(&hit.told()))
+pub(crate) fn counts(found: &TreeHit, condition: &Condition<'_>) -> bool {
+    condition.is_behind(&found.hit) && condition.accept.is_none_or(|accept| accept(&found.told()))
 }
 
 /// The first of these lanes of a block that occludes a ray, where it is: in the instance of this interval, or in the world.
@@ -95,13 +95,8 @@ pub(crate) fn occluder<B: LeafBlock>(
         let id = named(block.id(lane), ray);
         let is_there = || B::OCCLUDERS_ARE_SURE || block.occludes(lane, ray, filters);
         let hit = || {
-            let hit = block.hit(lane, ray, filters, QueryKind::Occluded)?;
-            let hit = Hit {
-                t: interval.clamp(hit.t),
-                inst_id: ray.inst_id,
-                ..hit
-            };
-            Some(hit.told())
+            let found = block.hit(lane, ray, filters, QueryKind::Occluded)?;
+            Some(found.placed(interval, ray.inst_id).told())
         };
         occludes(id, condition, is_there, hit).then_some(id)
     })

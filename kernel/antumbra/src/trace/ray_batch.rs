@@ -3,6 +3,7 @@
 use core::fmt;
 use core::ops::Range;
 
+use crate::geometry::best::TreeHit;
 use crate::prim_id::PrimId;
 use crate::ray::{Hit, Ray};
 use crate::trace::condition::{Condition, Conditions};
@@ -50,7 +51,7 @@ pub(crate) enum Report<'a> {
 #[derive(Clone, Copy)]
 pub(crate) struct LocatedHit {
     /// With ids as in the tree.
-    pub hit: Hit,
+    pub hit: TreeHit,
     /// Leaf of the primitive.
     pub leaf: Child,
     /// Index of its instance, or [`LocatedHit::WORLD`].

@@ -2,7 +2,7 @@
 
 use antumbra_simd::Simd;
 
-use crate::geometry::best::Best;
+use crate::geometry::best::{Best, TreeHit};
 use crate::geometry::cutout::Filters;
 use crate::geometry::cutout::opacity::QueryKind;
 use crate::geometry::instance_ray::Interval;
@@ -22,36 +22,40 @@ pub(crate) const MOST: usize = 8;
 /// Hits of a ray, front to back, with ids as in the tree.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct NearestHits {
-    hits: [Hit; MOST],
+    hits: [TreeHit; MOST],
     len: usize,
 }
 
 impl NearestHits {
     const EMPTY: Self = Self {
-        hits: [Hit::none(0.0); MOST],
+        hits: [TreeHit {
+            hit: Hit::none(0.0),
+            t: 0.0,
+        }; MOST],
         len: 0,
     };
 
-    pub fn hits(&self) -> &[Hit] {
+    pub fn hits(&self) -> &[TreeHit] {
         &self.hits[..self.len]
     }
 
     /// The last hit of a full list: the ray may have more behind it.
-    pub fn last(&self) -> Option<Hit> {
+    pub fn last(&self) -> Option<TreeHit> {
         self.hits().get(MOST - 1).copied()
     }
 
     /// Puts a hit in its place. The last hit of a full list leaves it. Hits that are in the list are not taken again: a
     /// triangle may be in several leaves.
-    fn insert(&mut self, hit: Hit) {
-        let before = self.hits().partition_point(|other| other.precedes(&hit));
-        let is_there = (self.hits().get(before)).is_some_and(|other| !hit.precedes(other));
+    fn insert(&mut self, found: TreeHit) {
+        let hit = found.hit;
+        let before = (self.hits()).partition_point(|other| other.hit.precedes(&hit));
+        let is_there = (self.hits().get(before)).is_some_and(|other| !hit.precedes(&other.hit));
         if before == MOST || is_there {
             return;
         }
         self.len = MOST.min(self.len + 1);
         self.hits[before..self.len].rotate_right(1);
-        self.hits[before] = hit;
+        self.hits[before] = found;
     }
 }
 
@@ -74,11 +78,11 @@ pub(crate) struct Listed {
 }
 
 impl Takes for Listed {
-    fn offer_if(&mut self, hit: Hit, counts: impl FnOnce(&Hit) -> bool) -> bool {
-        let Some(hit) = self.last.preceded_by(hit).filter(counts) else {
+    fn offer_if(&mut self, found: TreeHit, counts: impl FnOnce(&TreeHit) -> bool) -> bool {
+        let Some(found) = self.last.preceded_by(found).filter(counts) else {
             return false;
         };
-        self.nearest.insert(hit);
+        self.nearest.insert(found);
         if let Some(last) = self.nearest.last() {
             self.last.take(last);
         }
@@ -156,12 +160,13 @@ mod tests {
         let mut all = alloc::vec::Vec::new();
         for step in 0..40 {
             let hit = hit(step * 7 % 11, step % 2);
-            list.insert(hit);
-            list.insert(hit);
+            list.insert(hit.into());
+            list.insert(hit.into());
             all.push((step * 7 % 11, step % 2));
             all.sort_unstable();
             all.dedup();
-            let found = list.hits().iter().map(|hit| (hit.t as u32, hit.prim_id));
+            let found = list.hits().iter().map(|found| found.hit);
+            let found = found.map(|hit| (hit.t as u32, hit.prim_id));
             assert!(found.eq(all.iter().copied().take(MOST)));
             assert_eq!(list.last().is_some(), all.len() >= MOST);
         }

@@ -2,7 +2,7 @@
 //!
 //! The position of a hit is the point of the ray at the distance of the hit, which is rounded once, in double precision. On a
 //! triangle it is then moved to the nearest point of the plane. (The mean of the corners by the barycentrics lies in the plane,
-//! too, but far from the ray on slivers, whose barycentrics are of single precision.)
+//! too, but on long triangles farther from the ray: a rounding of a weight is one of the whole length.)
 
 use antumbra_simd::Scalar;
 
@@ -66,7 +66,7 @@ pub(crate) fn surface(tree: &Tree, view: impl View, ray: &Ray, found: &LocatedHi
             }),
         };
         let told = here.and_then(
-            |ray| on_seen_leaf!(Scalar, tree, view, leaf, block => of_block(block, ray, &found.hit)),
+            |ray| on_seen_leaf!(Scalar, tree, view, leaf, block => of_block(block, ray, found)),
         );
         if let Some((corners, found_normal)) = told {
             if let Some(corners) = corners {
@@ -114,13 +114,14 @@ fn in_plane(point: [f64; 3], [a, b, c]: &[[f64; 3]; 3]) -> [f64; 3] {
 /// Corners of a triangle, and the normal at a hit on a primitive of a block, in the space of the block.
 type Here = (Option<[[f32; 3]; 3]>, Option<Normal>);
 
-fn of_block<B: LeafBlock>(block: &B, ray: &Ray, hit: &Hit) -> Option<Here> {
+fn of_block<B: LeafBlock>(block: &B, ray: &Ray, found: &LocatedHit) -> Option<Here> {
+    let hit = &found.hit.told();
     let sought = PrimRef {
-        geom_id: hit.geom_id,
-        prim_id: hit.prim_id,
+        geom_id: found.hit.hit.geom_id,
+        prim_id: found.hit.hit.prim_id,
     };
     let lane = (0..block.count()).find(|&lane| block.id(lane) == sought)?;
-    Some((block.corners(lane), block.normal(lane, ray, &hit.told())))
+    Some((block.corners(lane), block.normal(lane, ray, hit)))
 }
 
 /// A normal of length 1 in the world, given the columns of the map from the world to the object where it is.
@@ -155,7 +156,7 @@ mod tests {
     use super::*;
     use crate::{Bvh, Geometry, Recipe};
 
-    /// Slivers, whose barycentrics are of little use: points in their plane and on the ray, but for the rounding of three
+    /// Slivers: points in their plane and on the ray, but for the rounding of three
     /// coordinates and of the distance.
     #[test]
     fn points_are_in_the_plane_and_on_the_ray() {

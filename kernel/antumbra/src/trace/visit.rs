@@ -25,6 +25,7 @@ use core::cmp::{Ordering, Reverse};
 use antumbra_simd::{Lanes, Simd, Width, WithSimd};
 
 use crate::geometry::QueryKind;
+use crate::geometry::best::TreeHit;
 use crate::geometry::instance_ray::Interval;
 use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::ray_setup::RaySetup;
@@ -109,7 +110,7 @@ struct Space {
 
 /// A hit, in the order in which hits are reported. The distance is no NaN and no negative zero.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ranked(pub Hit);
+pub(crate) struct Ranked(pub TreeHit);
 
 impl Ord for Ranked {
     fn cmp(&self, other: &Self) -> Ordering {
@@ -119,7 +120,7 @@ impl Ord for Ranked {
                        prim_id,
                        ..
                    }| (inst_id, geom_id, prim_id);
-        let (a, b) = (self.0, other.0);
+        let (a, b) = (self.0.hit, other.0.hit);
         a.t.total_cmp(&b.t).then_with(|| ids(a).cmp(&ids(b)))
     }
 }
@@ -166,7 +167,7 @@ impl Ahead {
     /// Takes the nearest hit out, if it lies before a child.
     fn hit_before(&mut self, child: Option<Waiting>) -> Option<Ranked> {
         let Reverse(nearest) = self.hits.peek()?;
-        let t = nearest.0.t.max(0.0).to_bits();
+        let t = nearest.0.hit.t.max(0.0).to_bits();
         if child.is_some_and(|child| child.distance() <= t) {
             return None;
         }
@@ -174,13 +175,10 @@ impl Ahead {
     }
 
     /// Takes a hit found in a space.
-    fn found(&mut self, space: u32, hit: Hit) {
+    fn found(&mut self, space: u32, found: TreeHit) {
         let Space { ray, interval } = &self.spaces[space as usize];
-        self.hits.push(Reverse(Ranked(Hit {
-            t: interval.clamp(hit.t),
-            inst_id: ray.inst_id,
-            ..hit
-        })));
+        let found = found.placed(*interval, ray.inst_id);
+        self.hits.push(Reverse(Ranked(found)));
     }
 }
 

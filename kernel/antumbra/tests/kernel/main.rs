@@ -26,7 +26,7 @@
 //! - [`known_answers`]: check sums of answers that never change
 //! - [`small`]: a little of everything, for an interpreter
 //! - [`world`]: objects that are built once and move;  [`refit`]: vertices that move
-//! - [`points`]: what is near a point, and what is around it
+//! - [`points`]: what is near a point, and what is around it;  [`precise`]: hits on long walls
 //! - [`moving`]: scenes that move while rays are traced
 //! - [`monitor`]: builds that are watched, and stopped
 //! - [`support`], [`transforms`]: what these share
@@ -52,6 +52,7 @@ mod oracle;
 mod orders;
 mod origin_offset;
 mod points;
+mod precise;
 mod quads;
 mod queries;
 mod refit;

@@ -8,6 +8,7 @@ use antumbra::recipe::Order;
 use antumbra::{Bvh, Geometry, Hit, INVALID_ID, Ray, Recipe};
 
 use crate::Error;
+use crate::surface::SEGMENT_SHARE;
 
 /// A tree over the emitting shapes of the world.
 #[derive(Debug)]
@@ -49,10 +50,11 @@ impl EmitterTree {
     }
 }
 
-/// Part of a ray before a hit. The part ends a few roundings earlier, so that the surface hit does not count.
+/// Part of a ray before a hit, of the same share as a [segment](crate::surface::segment) to a light, so that the surface hit
+/// does not count: the distance that decides what is hit is not quite the one that is reported.
 pub fn before(ray: &Ray, hit: &Hit) -> Ray {
     Ray {
-        tfar: hit.t * (1.0 - 16.0 * f32::EPSILON),
+        tfar: hit.t * SEGMENT_SHARE,
         ..*ray
     }
 }

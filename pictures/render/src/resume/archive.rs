@@ -18,7 +18,7 @@ use crate::Error;
 
 const MAGIC: &[u8; 8] = b"ANTUMBRA";
 /// Version of the format. Raise it with every change of the contents, or of the meaning of samples and tiles.
-const FORMAT: u32 = 4;
+const FORMAT: u32 = 5;
 const HEADER: usize = 16;
 const CHECKSUM: usize = 16;
 

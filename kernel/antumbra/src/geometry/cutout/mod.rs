@@ -12,7 +12,7 @@ use alloc::sync::Arc;
 use antumbra_simd::Simd;
 
 use crate::aabb::Aabb;
-use crate::geometry::best::Best;
+use crate::geometry::best::{Best, TreeHit};
 use crate::geometry::cutout::join::Joined;
 use crate::geometry::cutout::micromap::{MapRef, MicroMaps};
 use crate::geometry::cutout::opacity::{Opacity, QueryKind, accepts};
@@ -154,10 +154,16 @@ impl LeafBlock for CutoutBlock {
         self.triangles.candidates::<S, STREAM>(simd, ray, limit)
     }
 
-    fn hit(&self, lane: usize, ray: &RaySetup, filters: &Filters, query: QueryKind) -> Option<Hit> {
+    fn hit(
+        &self,
+        lane: usize,
+        ray: &RaySetup,
+        filters: &Filters,
+        query: QueryKind,
+    ) -> Option<TreeHit> {
         let values = self.triangles.values(lane, ray)?;
         let counts = CutoutHit::new(self, lane, values, filters).counts(query, ray, filters);
-        counts.then(|| self.triangles.hit_at(lane, values))
+        counts.then(|| self.triangles.refined_hit(lane, ray, values[0]))
     }
 
     #[inline(never)]
@@ -212,7 +218,7 @@ impl LeafBlock for CutoutBlock {
 pub(crate) struct CutoutHit<'a> {
     pub block: &'a CutoutBlock,
     pub lane: usize,
-    /// `t`, `u` and `v`.
+    /// `t`, `u` and `v` that decide.
     pub values: [f32; 3],
     /// See [`CutoutBlock::part`].
     pub part: usize,
@@ -239,18 +245,17 @@ impl<'a> CutoutHit<'a> {
         known.unwrap_or_else(|| self.block.ask(self.lane, [u, v], query, ray, filters))
     }
 
-    /// The hit, if it counts.
-    #[inline(always)]
-    pub fn hit(&self) -> Hit {
-        self.block.triangles.hit_at(self.lane, self.values)
-    }
-
     /// Replaces `best` by this hit if it counts and precedes it, and returns whether it did. The filter costs the most,
     /// so it is called last.
     #[inline(always)]
     pub fn improves(&self, best: &mut Best, ray: &RaySetup, filters: &Filters) -> bool {
-        best.offer_if(self.hit(), |_| {
+        let (triangles, lane, t) = (&self.block.triangles, self.lane, self.values[0]);
+        let improved = best.offer_if(triangles.hit_at(lane, t), |_| {
             self.counts(QueryKind::Intersect, ray, filters)
-        })
+        });
+        if improved {
+            best.refine(triangles.refined(lane, ray, t));
+        }
+        improved
     }
 }

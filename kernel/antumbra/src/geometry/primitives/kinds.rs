@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use super::Primitives;
 use super::dropped::DropReason;
 use crate::aabb::Aabb;
+use crate::geometry::best::TreeHit;
 use crate::geometry::cutout::micromap::Cutout;
 use crate::geometry::cutout::opacity::accepts;
 use crate::geometry::instance::PlacedObject;
@@ -290,24 +291,25 @@ impl Primitives {
     }
 
     /// The exact test of one primitive, in plain scalar code, and its own filter.
-    pub(crate) fn hit(&self, index: usize, ray: &RaySetup, query: QueryKind) -> Option<Hit> {
-        let (id, [t, u, v]) = match self.prim(index) {
+    pub(crate) fn hit(&self, index: usize, ray: &RaySetup, query: QueryKind) -> Option<TreeHit> {
+        let (id, [[t, u, v], reported]) = match self.prim(index) {
             Prim::Triangle(corners, id) => (id, triangle::hit(corners, ray)?),
-            Prim::Scalar(shape, id) => (id, shape.hit(id.prim_id, ray, ray.tfar)?),
+            Prim::Scalar(shape, id) => (id, [shape.hit(id.prim_id, ray, ray.tfar)?; 2]),
         };
         let counts = self.kind(index) != PrimKind::Cutout || {
             let filter = self.own_cutout(index).filter;
             let filter = &*self.filters.opacities[filter as usize].opacity;
             accepts(filter, id, [u, v], ray, id, query)
         };
-        counts.then_some(Hit {
+        let hit = Hit {
             t,
             u,
             v,
             prim_id: id.prim_id,
             geom_id: id.geom_id,
             inst_id: INVALID_ID,
-        })
+        };
+        counts.then(|| TreeHit::from(hit).refined(reported))
     }
 
     /// The name of a primitive, if an occlusion query hits it.

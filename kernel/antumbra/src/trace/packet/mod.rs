@@ -112,9 +112,9 @@ impl<const N: usize> Packet<'_, N> {
             let index = self.first + lane;
             let hit = || {
                 let ray = self.rays.sheared(lane, axes);
-                let seen = ShearedTriangle::new(&corners, &ray);
-                let [u, v] = seen.barycentrics();
-                Some(block.hit_at(triangle, [seen.distance(&ray)?, u, v]).told())
+                let t = ShearedTriangle::new(&corners, &ray).distance(&ray)?;
+                let ray = &self.batch.rays[index];
+                Some(block.refined_hit(triangle, ray, t).told())
             };
             let occludes = |condition: &Condition<'_>| judge::occludes(id, condition, || true, hit);
             if self.batch.with_condition(index, occludes) {
@@ -125,13 +125,14 @@ impl<const N: usize> Packet<'_, N> {
         counting
     }
 
-    /// Whether a hit of the ray in a lane fulfils its condition.
+    /// Whether a hit of the ray in a lane on a triangle of a block, decided at the distance `t`, fulfils its condition.
     #[cold]
     #[inline(never)]
-    fn counts(&self, lane: usize, hit: &Hit) -> bool {
+    fn counts(&self, lane: usize, block: &TriangleBlock, triangle: usize, t: f32) -> bool {
         let index = self.first + lane;
+        let found = block.refined_hit(triangle, &self.batch.rays[index], t);
         (self.batch).with_condition(index, |condition| {
-            condition.may_count(PrimId::from(hit.told())) && judge::counts(hit, condition)
+            condition.may_count(PrimId::from(found.told())) && judge::counts(&found, condition)
         })
     }
 }
@@ -462,11 +463,15 @@ impl PacketQuery for Closest {
                 }
                 ChildKind::Instance(_) if next == Child::DONE => {
                     for lane in LanesOf::<RAYS>(best.found) {
-                        answers[lane] = Some(best.hits[lane].told());
+                        let (leaf, triangle) = (best.leaves[lane], best.triangles[lane]);
+                        let block = &bvh.blocks.triangles[leaf.index()];
+                        let (ray, t) = (&batch.rays[first + lane], best.distances[lane]);
+                        let hit = block.refined_hit(triangle as usize, ray, t);
+                        answers[lane] = Some(hit.told());
                         if batch.reports_surfaces() {
                             let found = LocatedHit {
-                                hit: best.hits[lane],
-                                leaf: best.leaves[lane],
+                                hit,
+                                leaf,
                                 instance: LocatedHit::WORLD,
                             };
                             batch.report_surface(first + lane, &found);
@@ -490,9 +495,10 @@ struct BestOfLanes {
     limit: f32,
     /// Lanes with a hit, as bits.
     found: u32,
-    hits: [Hit; RAYS],
-    /// Per lane, the leaf of its hit.
+    /// Per lane, the name of the triangle hit, its leaf and its place there.
+    ids: [PrimRef; RAYS],
     leaves: [Child; RAYS],
+    triangles: [u32; RAYS],
 }
 
 impl BestOfLanes {
@@ -502,8 +508,12 @@ impl BestOfLanes {
             distances: [0.0; RAYS],
             limit: 0.0,
             found: 0,
-            hits: [Hit::none(0.0); RAYS],
+            ids: [PrimRef {
+                geom_id: INVALID_ID,
+                prim_id: INVALID_ID,
+            }; RAYS],
             leaves: [Child::EMPTY; RAYS],
+            triangles: [0; RAYS],
         };
         tfar.store(&mut best.distances);
         for lane in 0..RAYS {
@@ -542,7 +552,7 @@ impl BestOfLanes {
         leaf_rays: &LeafRays<S>,
         triangles: u32,
     ) -> bool {
-        let (rays, is_conditional) = (packet.rays, packet.batch.is_conditional());
+        let is_conditional = packet.batch.is_conditional();
         let zero = RayLanes::<S>::splat(simd, 0.0);
         let mut improved = false;
         for triangle in LanesOf::<BLOCK>(triangles) {
@@ -558,7 +568,7 @@ impl BestOfLanes {
                 tnear,
                 tfar: limits,
             };
-            let Verdict { sure, possible } = edges.judge::<RAYS>(simd, &ends);
+            let Verdict { possible, .. } = edges.judge::<RAYS>(simd, &ends);
             if !possible.any() {
                 continue;
             }
@@ -567,34 +577,23 @@ impl BestOfLanes {
             if hits == 0 {
                 continue;
             }
-            let mut values = [[0.0; RAYS]; 3];
-            let [u, v] = edges.barycentrics();
-            t.store(&mut values[0]);
-            u.store(&mut values[1]);
-            v.store(&mut values[2]);
-            let sure = sure.bits();
-            let corners = block.corners_of(triangle, leaf_rays.axes);
+            let mut distances = [0.0; RAYS];
+            t.store(&mut distances);
+            let id = block.id(triangle);
             for lane in LanesOf::<RAYS>(hits) {
-                let bit = 1 << lane;
-                let [t, u, v] = [values[0][lane], values[1][lane], values[2][lane]];
-                let [u, v] = if sure & bit != 0 {
-                    [u, v]
-                } else {
-                    let ray = rays.sheared(lane, leaf_rays.axes);
-                    ShearedTriangle::new(&corners, &ray).barycentrics()
-                };
-                let hit = Hit {
-                    t,
-                    u,
-                    v,
-                    prim_id: block.prim_ids[triangle],
-                    geom_id: block.geom_ids[triangle],
-                    inst_id: INVALID_ID,
-                };
-                let precedes = self.found & bit == 0 || hit.precedes(&self.hits[lane]);
-                if precedes && (!is_conditional || packet.counts(lane, &hit)) {
-                    self.hits[lane] = hit;
+                let (bit, t) = (1 << lane, distances[lane]);
+                // In the order of hits, all of them in the world.
+                let precedes = self.found & bit == 0
+                    || (t, id.geom_id, id.prim_id)
+                        < (
+                            self.distances[lane],
+                            self.ids[lane].geom_id,
+                            self.ids[lane].prim_id,
+                        );
+                if precedes && (!is_conditional || packet.counts(lane, block, triangle, t)) {
+                    self.ids[lane] = id;
                     self.leaves[lane] = leaf;
+                    self.triangles[lane] = triangle as u32;
                     self.distances[lane] = t;
                     self.found |= bit;
                     improved = true;
