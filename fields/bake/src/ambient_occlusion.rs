@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use antumbra::{Aabb, Bvh, Ray};
+use antumbra::{Bvh, Ray};
 use rayon::prelude::*;
 
 use crate::curve::OrderedPoints;
@@ -54,7 +54,7 @@ impl Default for AmbientOcclusion {
 /// Points and normals are `[n, 3]`; normals have any length. A point or normal that is not finite, and a normal of
 /// length 0, have the value NaN. Without any surface all others have 1. Surfaces count on both sides.
 ///
-/// Rays begin an [origin offset](Aabb::origin_offset) above the point, towards its normal, and `distance` counts from there.
+/// Rays begin an [origin offset](Bvh::origin_offset) above the point, towards its normal, and `distance` counts from there.
 /// The offset is computed from the box that encloses the scene and this point.
 ///
 /// A value depends only on its point, its normal and the choices. Its bits are the same for any number of threads, any recipe
@@ -139,14 +139,13 @@ pub fn ambient_rays(
     if check(points, normals, options).is_err() {
         return rays;
     }
-    let bounds = bvh.bounds();
     let samples = Samples::new(per_point as u32, options.weighting);
     for index in 0..some {
         // The product may be beyond a word.
         let place = (index as u128 * points.len() as u128 / some as u128) as usize;
         let (point, normal) = (&points[place], &normals[place]);
         if let Some(unit) = unit_normal(point, normal) {
-            let org = above(&bounds, point, unit);
+            let org = above(bvh, point, unit);
             let directions = samples.around(unit, key(options.seed, point, normal));
             let ray = |sample| Ray::new(org, directions.get(sample)).far(options.distance);
             rays.extend((0..per_point as u32).map(ray));
@@ -190,7 +189,6 @@ fn bake<T: Copy + Send + Sync>(
     let sides = if options.two_sided { 2 } else { 1 };
     let per_point = (options.samples as usize).saturating_mul(sides);
     let block = (RAYS / per_point).clamp(1, MOST_POINTS);
-    let bounds = bvh.bounds();
     let mut values = memory::filled("values", points.len(), none)?;
     let samples = Samples::new(options.samples, options.weighting);
     let places = OrderedPoints::new(points, normals)?;
@@ -200,7 +198,7 @@ fn bake<T: Copy + Send + Sync>(
     let done = AtomicUsize::new(0);
     let blocks = values.par_chunks_mut(block).enumerate();
     blocks.try_for_each_init(
-        || Worker::new((bvh, bounds), (options, &samples, wanted), monitor),
+        || Worker::new(bvh, (options, &samples, wanted), monitor),
         |worker, (index, values)| {
             let first = index * block;
             let range = first..first + values.len();
@@ -239,7 +237,6 @@ pub(crate) fn check(
 /// Rays of some points, with the memory that they take.
 struct Worker<'a> {
     bvh: &'a Bvh,
-    bounds: Aabb,
     options: &'a AmbientOcclusion,
     samples: &'a Samples,
     wanted: Wanted,
@@ -254,13 +251,12 @@ struct Worker<'a> {
 
 impl<'a> Worker<'a> {
     fn new(
-        (bvh, bounds): (&'a Bvh, Aabb),
+        bvh: &'a Bvh,
         (options, samples, wanted): (&'a AmbientOcclusion, &'a Samples, Wanted),
         monitor: &'a dyn Monitor,
     ) -> Self {
         Self {
             bvh,
-            bounds,
             options,
             samples,
             wanted,
@@ -320,7 +316,7 @@ impl<'a> Worker<'a> {
         normal: [f64; 3],
         key: u64,
     ) -> Result<(), Error> {
-        let org = above(&self.bounds, point, normal);
+        let org = above(self.bvh, point, normal);
         let directions = self.samples.around(normal, key);
         let tfar = self.options.distance;
         let mut sent = 0;
@@ -386,7 +382,7 @@ mod tests {
 
     /// The definition, ray by ray, without blocks, threads or a tree.
     fn by_brute_force(
-        (brute, bounds): (&Brute, Aabb),
+        brute: &Brute,
         point: &[f32; 3],
         normal: &[f32; 3],
         options: &AmbientOcclusion,
@@ -394,7 +390,7 @@ mod tests {
         let Some(unit) = unit_normal(point, normal) else {
             return f32::NAN;
         };
-        let offset = f64::from(bounds.union(&Aabb::around(&[*point])).origin_offset());
+        let offset = f64::from(brute.origin_offset(*point));
         let is_open = |sign: f64, sample: u32| {
             let up = unit.map(|x| sign * x);
             let samples = Samples::new(options.samples / 2, options.weighting);
@@ -443,10 +439,9 @@ mod tests {
                 };
                 let values = ambient_occlusion(&bvh, &mesh.positions, &normals, &options, &());
                 let values = values.expect("values");
-                let world = (&brute, bvh.bounds());
                 for (index, value) in values.iter().enumerate().take(120) {
                     let expected =
-                        by_brute_force(world, &mesh.positions[index], &normals[index], &options);
+                        by_brute_force(&brute, &mesh.positions[index], &normals[index], &options);
                     assert_eq!(value.to_bits(), expected.to_bits(), "{} {index}", mesh.name);
                 }
             }

@@ -71,11 +71,11 @@ pub fn split_at_creases(positions: &[[f32; 3]], indices: &[[u32; 3]], degrees: f
     creased
 }
 
-/// Vertices at edges of surfaces, moved by `distance` into their surface; all others as they are.
+/// Vertices at edges of surfaces, moved by a distance into their surface; all others as they are.
 ///
 /// An edge of a surface is an edge of one triangle only, which sides of a crease have, too. The move is along the mean direction
 /// of the triangles around the vertex, at a right angle to the vertex normal. Vertices without a normal stay.
-pub fn inside_edges(mesh: &Mesh, distance: f64) -> Vec<[f32; 3]> {
+pub fn inside_edges(mesh: &Mesh, distance: impl Fn([f32; 3]) -> f32) -> Vec<[f32; 3]> {
     let Mesh {
         positions,
         normals,
@@ -115,6 +115,7 @@ pub fn inside_edges(mesh: &Mesh, distance: f64) -> Vec<[f32; 3]> {
         let along = dot(sum, normal);
         let flat = [0, 1, 2].map(|axis| sum[axis] - along * normal[axis]);
         let inwards = unit(flat)?;
+        let distance = f64::from(distance(*position));
         let place = |axis: usize| f64::from(position[axis]) + distance * inwards[axis];
         Some([0, 1, 2].map(|axis| place(axis) as f32))
     };
@@ -366,10 +367,10 @@ mod tests {
         let (positions, indices) = cube();
         let mut mesh = Mesh::default();
         mesh.push((&positions, &indices), &[], &[], false);
-        assert_eq!(inside_edges(&mesh, 0.25), positions, "no edges");
+        assert_eq!(inside_edges(&mesh, |_| 0.25), positions, "no edges");
         let mut mesh = Mesh::default();
         mesh.push_creased((&positions, &indices), &[], false);
-        let moved = inside_edges(&mesh, 0.25);
+        let moved = inside_edges(&mesh, |_| 0.25);
         for (index, ((from, to), normal)) in mesh
             .positions
             .iter()

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::normals::unit;
 use crate::orientation::dot;
 use crate::surfaces::Flat;
-use crate::visibility::{above, origin_offset};
+use crate::visibility::above;
 use crate::{Mesh, Orientation, Sensors, Surface};
 
 /// Sides of the compass, clockwise from north.
@@ -148,13 +148,12 @@ impl Sensors {
         group: &(dyn Fn(u32) -> u32 + Sync),
         orientation: &Orientation,
     ) -> (Vec<Option<u32>>, usize) {
-        let bounds = bvh.bounds();
         let locate = |index: usize| {
             let point = &self.points[index];
             let normal = self.normals.get(index).map(|normal| normal.map(f64::from));
             let normal = unit(normal.unwrap_or(orientation.up)).unwrap_or([f64::NAN; 3]);
-            let ray = Ray::new(above(&bounds, point, normal), normal.map(|x| -x as f32));
-            let offset = origin_offset(&bounds, *point);
+            let ray = Ray::new(above(bvh, point, normal), normal.map(|x| -x as f32));
+            let offset = bvh.origin_offset(*point);
             let (mut end, mut own, mut is_ambiguous) = (f32::INFINITY, None, false);
             bvh.query(&ray).visit_hits(|hit| {
                 end = end.min(hit.t + offset);

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::curve::OrderedPoints;
 use crate::normals::unit;
 use crate::orientation::dot;
-use crate::visibility::{above, origin_offset};
+use crate::visibility::above;
 use crate::{Error, Job, Key, Monitor, Orientation, memory, sees_directions};
 
 /// Degrees between the rays that look for the highest surface.
@@ -76,17 +76,17 @@ impl HorizonJob {
 
     /// The ray of a sensor in a direction; `None` if the plane of its normal is in the way.
     fn ray(&self, bvh: &Bvh, item: usize, direction: [f64; 3]) -> Option<Ray> {
-        let (point, bounds) = (self.places.points[item], bvh.bounds());
+        let point = self.places.points[item];
         let dir = direction.map(|x| x as f32);
         match self.places.normals.get(item) {
             None => Some(Ray {
-                tnear: origin_offset(&bounds, point),
+                tnear: bvh.origin_offset(point),
                 ..Ray::new(point, dir)
             }),
             Some(normal) => {
                 let normal = unit(normal.map(f64::from))?;
                 let is_above = dot(normal, dir.map(f64::from)) > 0.0;
-                is_above.then(|| Ray::new(above(&bounds, &point, normal), dir))
+                is_above.then(|| Ray::new(above(bvh, &point, normal), dir))
             }
         }
     }

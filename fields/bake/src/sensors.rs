@@ -1,6 +1,6 @@
 //! Sensors: points that see the sky, the sun or each other, from meshes and grids.
 
-use antumbra::{Aabb, Bvh, Ray};
+use antumbra::{Bvh, Ray};
 
 use crate::normals::unit;
 use crate::orientation::dot;
@@ -218,12 +218,11 @@ impl Sensors {
         Ok(())
     }
 
-    /// Eyes of the sensors: raised by `height` along `up`, and an [origin offset](Aabb::origin_offset) above their surface if
-    /// they have one. `bounds` is the box around the scene.
-    pub fn eyes(&self, bounds: &Aabb, up: [f64; 3], height: f64) -> Vec<[f32; 3]> {
+    /// Eyes of the sensors: raised by `height` along `up`, and an [origin offset](Bvh::origin_offset) above their surface if
+    /// they have one.
+    pub fn eyes(&self, bvh: &Bvh, up: [f64; 3], height: f64) -> Vec<[f32; 3]> {
         let eye = |(index, point): (usize, &[f32; 3])| {
-            let around = bounds.union(&Aabb::around(&[*point]));
-            let offset = f64::from(around.origin_offset());
+            let offset = f64::from(bvh.origin_offset(*point));
             let normal = self.normals.get(index).copied().unwrap_or_default();
             let normal = normal.map(f64::from);
             let length = normal.iter().map(|x| x * x).sum::<f64>().sqrt();

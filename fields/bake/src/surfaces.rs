@@ -148,11 +148,12 @@ impl Surfaces {
     fn sees_from_behind(&self, bvh: &Bvh, mesh: &Mesh, triangles: &[u32]) -> bool {
         let mut seen = [0_u32; 2];
         for (point, normal) in samples(mesh, triangles) {
+            let starts = [1.0, -1.0].map(|side| start(bvh, point, normal.map(|x| x * side)));
             // The zenith is the last direction.
             for direction in self.sky.iter().rev().step_by(16) {
                 let cosine = dot(*direction, normal);
-                let ray = ray(bvh, point, normal.map(|x| x * cosine.signum()), *direction);
-                seen[usize::from(cosine < 0.0)] += u32::from(!bvh.occluded(&ray));
+                let side = usize::from(cosine < 0.0);
+                seen[side] += u32::from(!bvh.occluded(&ray(starts[side], *direction)));
             }
         }
         f64::from(seen[1]) > MORE_SKY * f64::from(seen[0])
@@ -192,7 +193,8 @@ impl Surfaces {
                 let triangles: Vec<u32> = members.of(body).iter().filter(is_up).copied().collect();
                 let places = samples(mesh, &triangles);
                 let is_above = |(point, normal): &&([f64; 3], [f64; 3])| {
-                    let ray = ray(bvh, *point, normal.map(|x| -x), self.up.map(|x| -x));
+                    let start = start(bvh, *point, normal.map(|x| -x));
+                    let ray = ray(start, self.up.map(|x| -x));
                     let Some(hit) = bvh.intersect(&ray) else {
                         return false;
                     };
@@ -238,7 +240,8 @@ impl Surfaces {
             };
             let is_down = self.kinds[triangle as usize] == Surface::Underside;
             let sign = if is_down { -1.0 } else { 1.0 };
-            let above = |direction: [f64; 3]| ray(bvh, point, normal, direction);
+            let start = start(bvh, point, normal);
+            let above = |direction: [f64; 3]| ray(start, direction);
             let sky = self
                 .sky
                 .iter()
@@ -305,9 +308,12 @@ fn sees_backs((bvh, flat): (&Bvh, Flat<'_>), mesh: &Mesh, rays: &[Ray]) -> bool 
     2 * some.iter().zip(hits).filter(is_back).count() > some.len()
 }
 
-/// A ray from just above a surface.
-fn ray(bvh: &Bvh, point: [f64; 3], normal: [f64; 3], direction: [f64; 3]) -> Ray {
-    let start = above(&bvh.bounds(), &point.map(|x| x as f32), normal);
+/// Where rays from a point of a surface begin.
+fn start(bvh: &Bvh, point: [f64; 3], normal: [f64; 3]) -> [f32; 3] {
+    above(bvh, &point.map(|x| x as f32), normal)
+}
+
+fn ray(start: [f32; 3], direction: [f64; 3]) -> Ray {
     Ray::new(start, direction.map(|x| x as f32))
 }
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::job::{bytes_of, words_of};
 use crate::normals::{cross, unit};
-use crate::visibility::above;
+use crate::visibility::moved;
 use crate::{Error, Job, Key, Monitor, memory, run};
 
 /// Rays that a thread traces together.
@@ -158,18 +158,19 @@ impl Job for ViewFactorJob<'_> {
 
 /// A surface that emits.
 struct Emitter<'a> {
-    bvh: &'a Bvh,
     triangles: &'a [[[f32; 3]; 3]],
+    /// Normals of length 1, and origin offsets, each the largest of the corners.
     normals: Vec<Option<[f64; 3]>>,
+    offsets: Vec<f32>,
     /// Sums of areas up to and including each triangle, over the total area: ascending to 1.
     ends: Vec<f64>,
 }
 
 impl<'a> Emitter<'a> {
     /// `None` if the surface has no area.
-    fn new(bvh: &'a Bvh, triangles: &'a [[[f32; 3]; 3]]) -> Option<Self> {
+    fn new(bvh: &Bvh, triangles: &'a [[[f32; 3]; 3]]) -> Option<Self> {
         let mut sum = 0.0;
-        let (mut ends, mut normals) = (Vec::new(), Vec::new());
+        let (mut ends, mut normals, mut offsets) = (Vec::new(), Vec::new(), Vec::new());
         for corners in triangles {
             let [a, b, c] = corners.map(|corner| corner.map(f64::from));
             let minus = |a: [f64; 3], b: [f64; 3]| [0, 1, 2].map(|axis| a[axis] - b[axis]);
@@ -178,12 +179,14 @@ impl<'a> Emitter<'a> {
             sum += if area.is_finite() { area } else { 0.0 };
             ends.push(sum);
             normals.push(unit(twice));
+            let most = corners.map(|corner| bvh.origin_offset(corner));
+            offsets.push(most.into_iter().fold(0.0, f32::max));
         }
         ends.iter_mut().for_each(|end| *end /= sum);
         (sum > 0.0).then_some(Self {
-            bvh,
             triangles,
             normals,
+            offsets,
             ends,
         })
     }
@@ -221,7 +224,7 @@ impl<'a> Emitter<'a> {
         let direction: [f64; 3] = std::array::from_fn(|axis| {
             radius * (cos * right[axis] + sin * up[axis]) + height * normal[axis]
         });
-        let start = above(&self.bvh.bounds(), &point.map(|x| x as f32), normal);
+        let start = moved(&point.map(|x| x as f32), self.offsets[triangle], normal);
         Ray::new(start, direction.map(|x| x as f32))
     }
 }

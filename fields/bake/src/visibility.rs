@@ -28,7 +28,7 @@ const MOST_POINTS: usize = 1 << 12;
 ///
 /// | normals | a direction is seen if |
 /// |---|---|
-/// | of surfaces | it lies above the plane of the normal, and nothing is in the way from an [origin offset](Aabb::origin_offset) above the point on |
+/// | of surfaces | it lies above the plane of the normal, and nothing is in the way from an [origin offset](Bvh::origin_offset) above the point on |
 /// | empty | nothing is in the way from an origin offset along the direction on |
 ///
 /// Points without normals may be in free space or on surfaces. A point on a surface sees from both sides of it, since nothing
@@ -99,7 +99,6 @@ pub(crate) fn fold_directions<T: Send>(
 /// Points that look in directions.
 pub(crate) struct DirectionRows<'a> {
     bvh: &'a Bvh,
-    bounds: Aabb,
     places: OrderedPoints,
     directions: Directions,
     distance: f32,
@@ -127,7 +126,6 @@ impl<'a> DirectionRows<'a> {
         );
         Ok(Self {
             bvh,
-            bounds: bvh.bounds(),
             places,
             directions: Directions::new(&all),
             distance,
@@ -149,10 +147,8 @@ impl<'a> DirectionRows<'a> {
         let point = self.places.points[row];
         match self.facing(row) {
             None => ([f32::NAN; 3], 0.0),
-            Some(_) if self.places.normals.is_empty() => {
-                (point, origin_offset(&self.bounds, point))
-            }
-            Some(normal) => (above(&self.bounds, &point, normal), 0.0),
+            Some(_) if self.places.normals.is_empty() => (point, self.bvh.origin_offset(point)),
+            Some(normal) => (above(self.bvh, &point, normal), 0.0),
         }
     }
 
@@ -219,15 +215,14 @@ fn ray_direction(dir: [f32; 3], has_lengths: bool) -> [f32; 3] {
     }
 }
 
-/// [Origin offset](Aabb::origin_offset) of a point in a scene with these bounds.
-pub(crate) fn origin_offset(bounds: &Aabb, point: [f32; 3]) -> f32 {
-    bounds.union(&Aabb::around(&[point])).origin_offset()
+/// The point moved by its origin offset along its normal of length 1.
+pub(crate) fn above(bvh: &Bvh, point: &[f32; 3], normal: [f64; 3]) -> [f32; 3] {
+    moved(point, bvh.origin_offset(*point), normal)
 }
 
-/// The point moved by an origin offset along its normal of length 1.
-pub(crate) fn above(bounds: &Aabb, point: &[f32; 3], normal: [f64; 3]) -> [f32; 3] {
-    let offset = f64::from(origin_offset(bounds, *point));
-    std::array::from_fn(|axis| (f64::from(point[axis]) + offset * normal[axis]) as f32)
+/// The point moved along its normal of length 1.
+pub(crate) fn moved(point: &[f32; 3], offset: f32, normal: [f64; 3]) -> [f32; 3] {
+    std::array::from_fn(|axis| (f64::from(point[axis]) + f64::from(offset) * normal[axis]) as f32)
 }
 
 /// Lines of sight between points of a scene, which may be on its surfaces.
@@ -237,22 +232,22 @@ pub(crate) fn above(bounds: &Aabb, point: &[f32; 3], normal: [f64; 3]) -> [f32; 
 ///
 /// | margin | length left out |
 /// |---|---|
-/// | `None` | the [origin offset](Aabb::origin_offset) of the scene and of the point at that end |
+/// | `None` | the [origin offset](Bvh::origin_offset) of the point at that end |
 /// | `Some(length)` | this length, in units of the scene; 0 for the bare segment |
 ///
 /// Points nearer to each other than both lengths together see each other, and so do equal points. Rounding may hide lines that
 /// are within about one degree of the surface of a point.
-pub struct SightLines {
+pub struct SightLines<'a> {
+    bvh: &'a Bvh,
     margin: Option<f32>,
-    bounds: Aabb,
 }
 
-impl SightLines {
+impl<'a> SightLines<'a> {
     /// Lines in the scene of a tree.
     ///
     /// # Errors
     /// [`Error::Range`] if the margin is negative or not finite.
-    pub fn new(bvh: &Bvh, margin: Option<f32>) -> Result<Self, Error> {
+    pub fn new(bvh: &'a Bvh, margin: Option<f32>) -> Result<Self, Error> {
         if let Some(found) = margin
             && !(found >= 0.0 && found.is_finite())
         {
@@ -262,22 +257,25 @@ impl SightLines {
                 wanted: "a finite number from 0",
             });
         }
-        let bounds = bvh.bounds();
-        Ok(Self { margin, bounds })
+        Ok(Self { bvh, margin })
     }
 
     /// Ray over the part of the line that counts: the points see each other if it is not occluded. Its interval is empty if no
     /// part counts.
     ///
-    /// By default the ray begins at the end with the smaller offset, so that a far end does not make the other one less precise.
+    /// By default the ray begins at the end that is not beyond the scene, so that a far end does not make the other one less precise.
     pub fn ray(&self, local: &LocalOrigin, from: [f64; 3], to: [f64; 3]) -> Ray {
         let end = |point| (point, self.margin(local.local(point)));
         between(local, [end(from), end(to)])
     }
 
     /// Length left out at a point.
-    fn margin(&self, point: [f32; 3]) -> f32 {
-        (self.margin).unwrap_or_else(|| origin_offset(&self.bounds, point))
+    fn margin(&self, point: [f32; 3]) -> Margin {
+        let box_of_all = || self.bvh.bounds().union(&Aabb::around(&[point]));
+        Margin {
+            length: (self.margin).unwrap_or_else(|| self.bvh.origin_offset(point)),
+            extent: self.margin.map_or_else(|| box_of_all().reach(), |_| 0.0),
+        }
     }
 
     /// Points with the lengths left out there, in the order of `places`.
@@ -292,18 +290,27 @@ impl SightLines {
     }
 }
 
-/// An end of a line of sight, and the length left out there.
-type End = ([f32; 3], f32);
+/// An end of a line of sight, and what is left out there.
+type End = ([f32; 3], Margin);
+
+/// What is left out at an end of a line.
+#[derive(Clone, Copy)]
+struct Margin {
+    length: f32,
+    /// Largest coordinate of the scene and this end, or 0 if the margin is given.
+    extent: f32,
+}
 
 /// Ray over the part of the line between two points that is farther from each of them than the length beside it.
 #[inline]
-fn between(local: &LocalOrigin, ends: [([f64; 3], f32); 2]) -> Ray {
-    let [(first, near), (last, far)] = match ends[1].1 < ends[0].1 {
+fn between(local: &LocalOrigin, ends: [([f64; 3], Margin); 2]) -> Ray {
+    let [(first, near), (last, far)] = match ends[1].1.extent < ends[0].1.extent {
         true => [ends[1], ends[0]],
         false => ends,
     };
     let ray = local.between(first, last);
     let apart = ray.dir.map(f64::from);
+    let [near, far] = [near.length, far.length];
     let length = match far > 0.0 {
         true => dot(apart, apart).sqrt(),
         false => f64::INFINITY,

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use antumbra::{Aabb, Bvh};
+use antumbra::Bvh;
 
 use crate::job::{bytes_of, words_of};
 use crate::orientation::dot;
@@ -20,9 +20,9 @@ pub struct Eyes<'a> {
 
 impl<'a> Eyes<'a> {
     /// [Eyes](Sensors::eyes) of sensors.
-    pub fn new(sensors: &'a Sensors, bounds: &Aabb, up: [f64; 3], height: f64) -> Self {
+    pub fn new(sensors: &'a Sensors, bvh: &Bvh, up: [f64; 3], height: f64) -> Self {
         Self {
-            points: sensors.eyes(bounds, up, height),
+            points: sensors.eyes(bvh, up, height),
             normals: &sensors.normals,
         }
     }

@@ -199,7 +199,7 @@ pub struct Segments<'a> {
     len: usize,
     from: Operand<'a>,
     to: Operand<'a>,
-    lines: SightLines,
+    lines: SightLines<'a>,
     local: LocalOrigin,
 }
 
@@ -208,7 +208,7 @@ impl<'a> Segments<'a> {
         from: &'a Numbers<'_>,
         to: &'a Numbers<'_>,
         shape: &[usize],
-        lines: SightLines,
+        lines: SightLines<'a>,
         local: LocalOrigin,
     ) -> Self {
         Self {

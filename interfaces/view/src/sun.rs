@@ -193,7 +193,7 @@ impl Probe {
 fn ray(bvh: &Bvh, sight: &Sight, sun: &Sun) -> Option<Ray> {
     let is_day = sun.elevation > 0.0 && dot(sight.normal, sun.direction) > 0.0;
     is_day.then(|| {
-        let offset = bvh.bounds().origin_offset();
+        let offset = bvh.origin_offset(sight.point);
         let start = [0, 1, 2].map(|i| sight.point[i] + offset * sight.normal[i]);
         Ray::new(start, sun.direction)
     })

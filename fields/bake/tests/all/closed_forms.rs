@@ -140,6 +140,30 @@ fn the_foot_of_an_endless_wall_and_half_a_ceiling_are_half_open() {
     }
 }
 
+/// Openness at a distance of `1 / k` from the foot of an endless wall of height 1, which no longer wall may change:
+/// `1/2 + 1/2 / sqrt(1 + k²)`, by integration of the cosine over what is above the wall.
+#[test]
+fn a_wall_hides_as_much_in_large_scenes_as_in_small_ones() {
+    for half in [100.0, 1000.0, 4000.0, 20_000.0] {
+        let bvh = quad([
+            [0.0, -half, 0.0],
+            [0.0, half, 0.0],
+            [0.0, half, 1.0],
+            [0.0, -half, 1.0],
+        ]);
+        for k in [60.0, 10.0, 2.0, 1.0, 0.6, 0.1_f32] {
+            let many = AmbientOcclusion {
+                samples: 65_536,
+                ..options(Weighting::Cosine)
+            };
+            let found = at(&bvh, [1.0 / k, 0.0, 0.0], [0.0, 0.0, 1.0], many);
+            let expected = 0.5 + 0.5 / (1.0 + k * k).sqrt();
+            let error = (found - expected).abs();
+            assert!(error < 4e-4, "{half} {k}: {found} for {expected}");
+        }
+    }
+}
+
 #[test]
 fn a_disc_overhead_covers_its_projected_solid_angle() {
     let count = 512;

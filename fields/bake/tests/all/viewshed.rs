@@ -46,9 +46,9 @@ impl Terrain {
         };
         let up = [0.0, 0.0, 1.0];
         let places = list(bent.clone());
-        let rows = Eyes::new(&places, &bvh.bounds(), up, 0.0);
+        let rows = Eyes::new(&places, &bvh, up, 0.0);
         let looking = list(observers.iter().map(|&cell| bent[cell]).collect());
-        let columns = Eyes::new(&looking, &bvh.bounds(), up, eye);
+        let columns = Eyes::new(&looking, &bvh, up, eye);
         let job = VisibilityJob {
             rows: &rows,
             columns: Some(&columns),

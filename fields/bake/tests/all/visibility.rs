@@ -63,8 +63,7 @@ fn bits_are_those_of_single_rays_on_every_width() {
         let sight = sees_points(&bvh, &from, &to, Some(0.0), &()).expect("bits");
         for (row, (&org, normal)) in from.iter().zip(&normals).enumerate() {
             for (column, &dir) in directions.iter().enumerate() {
-                let around = bvh.bounds().union(&Aabb::around(&[org]));
-                let offset = f64::from(around.origin_offset());
+                let offset = f64::from(bvh.origin_offset(org));
                 // The offset counts in units of the scene, along the direction scaled to length 1.
                 let mut ray = Ray::new(org, unit(dir));
                 ray.tnear = offset as f32;

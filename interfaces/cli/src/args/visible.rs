@@ -61,9 +61,9 @@ pub struct VisibleArgs {
     pub target: f64,
     /// Left out at both ends [default: origin offset]
     ///
-    /// The origin offset is about 4 millionths of the largest coordinate. A point on a surface is rounded, and without a
-    /// margin its own surface hides it now and then. 0 takes the bare lines. The viewshed of a height raster is then made by rays
-    /// too, instead of exactly.
+    /// The origin offset is about 4 millionths of the largest coordinate of the point and of its surface. A point on a surface is
+    /// rounded, and without a margin its own surface hides it now and then. 0 takes the bare lines. The viewshed of a height
+    /// raster is then made by rays too, instead of exactly.
     #[arg(long, value_name = "UNITS", value_parser = values::from_zero, help_heading = heading::WORK)]
     pub margin: Option<f64>,
     /// Axis that points up [default: the scene's]

@@ -133,7 +133,7 @@ pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Res
         (Format::Picture, Some(size)) => Target::Texels(atlas(&ground, size)?),
         (Format::Picture, None) => Target::Pixels(View::new(&ground)?),
         _ => {
-            let offset = f64::from(ground.bvh.bounds().origin_offset());
+            let offset = |point: [f32; 3]| ground.bvh.origin_offset(point);
             Target::Vertices(inside_edges(&ground.mesh, offset))
         }
     };

@@ -212,14 +212,20 @@ impl Ground {
         spacing: f64,
         plan: &Orientation,
     ) -> Result<Sensors, Failure> {
-        let offset = self.bvh.bounds().origin_offset();
-        if f64::from(offset) > 1e-2 * spacing {
-            say(format_args!(
-                "warning: rays begin {offset:.2e} above surfaces, more than a hundredth of the {spacing} between sensors: the \
-                 scene is large for such a grid"
-            ));
-        }
         let sensors = Sensors::on_grid(tree, spacing, plan);
+        if let Ok(sensors) = &sensors {
+            let offsets = sensors
+                .points
+                .iter()
+                .map(|point| self.bvh.origin_offset(*point));
+            let offset = offsets.fold(0.0, f32::max);
+            if f64::from(offset) > 1e-2 * spacing {
+                say(format_args!(
+                    "warning: rays begin up to {offset:.2e} above surfaces, more than a hundredth of the {spacing} between \
+                     sensors: the scene is large for such a grid"
+                ));
+            }
+        }
         sensors.map_err(|error| match error {
             Error::NothingBelow => Failure::Usage(format!("--grid: {error}; is --up right?")),
             _ => Failure::Usage(format!("--grid {spacing}: that makes {error}")),

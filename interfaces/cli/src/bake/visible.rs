@@ -152,10 +152,10 @@ impl Points {
             true => [args.target, args.eye],
             false => [args.eye, args.target],
         };
-        let bounds = ground.bvh.bounds();
-        let rows = Eyes::new(&self.rows, &bounds, plan.up, row_height);
+        let rows = Eyes::new(&self.rows, &ground.bvh, plan.up, row_height);
         let columns = self.columns.as_ref();
-        let columns = columns.map(|sensors| Eyes::new(sensors, &bounds, plan.up, column_height));
+        let columns =
+            columns.map(|sensors| Eyes::new(sensors, &ground.bvh, plan.up, column_height));
         (rows, columns)
     }
 }

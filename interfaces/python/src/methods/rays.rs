@@ -103,7 +103,7 @@ impl Queries {
     ///     Points. Leading shapes are broadcast. A point that is not finite sees nothing.
     /// margin : float, optional
     ///     Length that is left out at both ends of a segment. Without it, about 4 millionths of the largest coordinate, seen from
-    ///     ``origin``, of the scene and of the point at that end: the origin offset. A point on a surface is rounded, and its
+    ///     ``origin``, of the point at that end and of the triangles that it lies on: the origin offset. A point on a surface is rounded, and its
     ///     surface would hide it now and then. Lines within about one degree of the surface may still be hidden. 0 is the
     ///     bare segment.
     /// out : array (...) of bool, optional

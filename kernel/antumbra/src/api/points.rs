@@ -7,6 +7,7 @@ use super::bvh::Bvh;
 use crate::geometry::instance::dot;
 use crate::geometry::nearest::minus;
 use crate::geometry::quad::told_uv;
+use crate::geometry::ray_setup::ORIGIN_OFFSET;
 use crate::math;
 use crate::parallel::for_each;
 use crate::ray_columns::Distance;
@@ -14,7 +15,7 @@ use crate::trace::brute::Brute;
 use crate::trace::brute_points;
 use crate::trace::inside::{self, Around};
 use crate::trace::memory::Memory;
-use crate::trace::nearest::{Candidate, Nearest, Seeker, Within};
+use crate::trace::nearest::{Candidate, Nearest, Reach, Seeker, Within};
 
 /// Points that one thread takes at a time.
 const CHUNK: usize = 64;
@@ -141,6 +142,44 @@ impl Bvh {
         let point = point.into();
         within_by(point, radius, |within| {
             self.pool.with(|memory| self.seek(memory, point, within));
+        })
+    }
+
+    /// Origin offset: the distance from its surface at which a ray that leaves this point should begin, so that the surface does
+    /// not hide what is around it.
+    ///
+    /// It is [`Aabb::origin_offset`](crate::Aabb::origin_offset) of a box that holds the point and the primitives on which the point lies:
+    /// 4 millionths of the largest coordinate. Nothing else of the scene has a say, so what is near is as sharp in a scene of
+    /// 40 km as in one of 200 m. 0 for a point with a NaN or infinite coordinate.
+    ///
+    /// Why that is enough: let `u = 2⁻²⁴`, and let `m` be the largest coordinate. A point that was computed from a surface is off it
+    /// by a rounding or two of each coordinate, within `8 u m`, which is what "lies on" means here. Moving it along the normal
+    /// rounds once more, so it is off by `10 u m` at most. A hit on a triangle is decided within `11 u` of its size on each
+    /// axis, see the module `ray_setup`, which is `19 u` of at most `2 m`. So a ray that begins `48 u m` above the plane and goes
+    /// upwards hits neither this triangle nor another one around the point in this plane. The offset is `68 u m`, which leaves
+    /// room for normals of vertices that are 45 degrees off.
+    ///
+    /// Triangles, quads, spheres, disks and curves count, user geometry does not.
+    ///
+    /// ```
+    /// # use antumbra::{Bvh, Geometry, Recipe};
+    /// # let positions = [[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [0.0, 4.0, 0.0]];
+    /// # let geometry = [Geometry::triangles(&positions[..], vec![[0, 1, 2]])];
+    /// # let bvh = Bvh::build(&geometry, &Recipe::default())?;
+    /// use antumbra::Ray;
+    ///
+    /// let (point, normal) = ([1.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
+    /// let offset = bvh.origin_offset(point);
+    /// assert!(offset < 2e-5, "4 millionths of 4");
+    /// let org: [f32; 3] = std::array::from_fn(|axis| point[axis] + offset * normal[axis]);
+    /// assert!(!bvh.occluded(&Ray::new(org, [0.6, 0.0, 0.8])));
+    /// # Ok::<(), antumbra::Error>(())
+    /// ```
+    #[must_use]
+    pub fn origin_offset(&self, point: impl Into<[f32; 3]>) -> f32 {
+        let point = point.into();
+        origin_offset(point, |reach| {
+            self.pool.with(|memory| self.seek(memory, point, reach));
         })
     }
 
@@ -379,6 +418,15 @@ impl Brute {
         })
     }
 
+    /// [`Bvh::origin_offset`].
+    #[must_use]
+    pub fn origin_offset(&self, point: impl Into<[f32; 3]>) -> f32 {
+        let point = point.into();
+        origin_offset(point, |reach| {
+            brute_points::offer_all(self.primitives(), point, reach);
+        })
+    }
+
     /// Whether the point is inside, from a test of every primitive: the answer that [`Bvh::contains`] must have.
     #[must_use]
     pub fn contains(&self, point: impl Into<[f32; 3]>) -> bool {
@@ -451,6 +499,24 @@ fn within_by(point: [f32; 3], radius: f32, seek: impl FnOnce(&mut Within)) -> Ve
     let mut within = Within::new(radius.into());
     seek(&mut within);
     within.sorted().iter().map(ClosestPoint::new).collect()
+}
+
+/// See [`Bvh::origin_offset`].
+fn origin_offset(point: [f32; 3], seek: impl FnOnce(&mut Reach)) -> f32 {
+    if !is_finite(point) {
+        return 0.0;
+    }
+    let most = f64::from(
+        point
+            .into_iter()
+            .fold(0.0, |most: f32, x| most.max(x.abs())),
+    );
+    let mut reach = Reach {
+        distance: most / (1 << 21) as f64,
+        reach: most,
+    };
+    seek(&mut reach);
+    reach.reach as f32 * ORIGIN_OFFSET
 }
 
 /// Answers every point, given its index.

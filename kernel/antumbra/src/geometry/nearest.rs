@@ -3,6 +3,7 @@
 //! Corners are `f32`, all arithmetic is `f64`, in the world: corners in an instance are placed first. So an answer is a
 //! function of the point, the primitive and the transform only, and no tree can change a bit of it.
 
+use crate::aabb::Aabb;
 use crate::geometry::Sphere;
 use crate::geometry::instance::{Affine, dot};
 use crate::math;
@@ -68,6 +69,19 @@ impl Place<'_> {
             }
         }
         best
+    }
+
+    /// The largest coordinate of a box of the object, in the world. In an instance that is a bound of the parts whose sum a
+    /// coordinate is there, since each of them is rounded.
+    pub fn reach(&self, bounds: &Aabb) -> f64 {
+        let far: [f64; 3] = core::array::from_fn(|axis| {
+            f64::from(bounds.min[axis].abs().max(bounds.max[axis].abs()))
+        });
+        let most = |v: [f64; 3]| v.into_iter().fold(0.0, f64::max);
+        self.affine.map_or(most(far), |affine| {
+            let parts = |[x, y, z, at]: [f64; 4]| dot([x.abs(), y.abs(), z.abs()], far) + at.abs();
+            most(affine.rows.map(parts))
+        })
     }
 
     /// The nearest point of a side, given by its ends and their weights.

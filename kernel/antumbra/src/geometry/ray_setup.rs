@@ -89,6 +89,9 @@ use crate::ray::{INVALID_ID, Ray};
 
 /// Margin of node boxes relative to `R`: `32 u`.
 pub(crate) const NODE_MARGIN: f32 = 1.0 / (1 << 19) as f32;
+/// An origin offset relative to the largest coordinate: as if every ray began at the far end of the box that holds everything, with
+/// room for the roundings of its origin.
+pub(crate) const ORIGIN_OFFSET: f32 = 2.125 * NODE_MARGIN;
 /// Margin of the box of an instance or a sphere relative to `R`: `16 u`.
 pub(crate) const PRIM_MARGIN: f32 = NODE_MARGIN / 2.0;
 /// `24 u`: the doubt about a distance, see above.
@@ -396,10 +399,10 @@ impl Aabb {
     ///
     /// Boxes are tested a little larger than they are, so that rounding never costs a hit. A ray that begins nearer to a
     /// surface may visit the leaf that holds that surface, even if it goes away from it. All answers are right, but
-    /// occlusion queries take more steps.
+    /// occlusion queries take more steps. [`Bvh::origin_offset`](crate::Bvh::origin_offset) is the least one that keeps a surface from
+    /// hiding what is above it.
     pub fn origin_offset(&self) -> f32 {
-        // As if every ray began at the far end of the box, with room for the roundings of its origin.
-        self.reach() * (2.125 * NODE_MARGIN)
+        self.reach() * ORIGIN_OFFSET
     }
 }
 

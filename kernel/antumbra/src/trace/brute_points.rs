@@ -29,11 +29,17 @@ pub(crate) fn offer_all(world: &Primitives, point: [f32; 3], seeker: &mut dyn Se
 
 fn offer_list(list: &Primitives, place: &Place<'_>, inst_id: u32, seeker: &mut dyn Seeker) {
     for index in 0..list.len() {
-        let (near, id) = match list.prim(index) {
-            Prim::Triangle(corners, id) => (Some(place.triangle(corners)), id),
-            Prim::Scalar(shape, id) => (shape.near(id.prim_id, place), id),
+        let prim = list.prim(index);
+        let near = || match prim {
+            Prim::Triangle(corners, _) => Some(place.triangle(corners)),
+            Prim::Scalar(shape, id) => shape.near(id.prim_id, place),
         };
-        if let Some(near) = near {
+        if let Some(reach) = seeker.of_reach() {
+            reach.measure(list.kind(index), place, near, || list.bounds_of(index));
+            continue;
+        }
+        let (Prim::Triangle(_, id) | Prim::Scalar(_, id)) = prim;
+        if let Some(near) = near() {
             seeker.offer(Candidate { near, id, inst_id });
         }
     }

@@ -17,6 +17,7 @@ use alloc::vec::Vec;
 
 use antumbra_simd::{Lanes, Mask, Scalar, Simd, Width, WithSimd};
 
+use crate::aabb::Aabb;
 use crate::geometry::instance::{Affine, dot};
 use crate::geometry::leaf_block::LeafBlock;
 use crate::geometry::near_test::{self, Bounds};
@@ -71,6 +72,50 @@ pub(crate) trait Seeker {
 
     /// Takes a primitive, which may be too far away, or given twice. Returns whether the limit has shrunk.
     fn offer(&mut self, candidate: Candidate) -> bool;
+
+    /// The seeker, if it only wants to know how far primitives reach.
+    fn of_reach(&mut self) -> Option<&mut Reach> {
+        None
+    }
+}
+
+/// The largest coordinate of what is within a distance, user geometry aside.
+#[derive(Debug)]
+pub(crate) struct Reach {
+    pub distance: f64,
+    pub reach: f64,
+}
+
+impl Reach {
+    /// Takes a primitive of a kind, given how to measure it and its box.
+    pub fn measure(
+        &mut self,
+        kind: PrimKind,
+        place: &Place<'_>,
+        near: impl FnOnce() -> Option<Near>,
+        bounds: impl FnOnce() -> Aabb,
+    ) {
+        let is_there = |near: Near| near.distance2 <= self.distance * self.distance;
+        if kind != PrimKind::User && near().is_some_and(is_there) {
+            self.reach = self.reach.max(place.reach(&bounds()));
+        }
+    }
+}
+
+impl Seeker for Reach {
+    fn limit(&self) -> f64 {
+        self.distance
+    }
+
+    fn cap(&mut self, _: f64) {}
+
+    fn offer(&mut self, _: Candidate) -> bool {
+        false
+    }
+
+    fn of_reach(&mut self) -> Option<&mut Self> {
+        Some(self)
+    }
 }
 
 /// The nearest primitive within a distance.
@@ -574,7 +619,12 @@ fn offer_others<const N: usize>(
 
 #[inline(always)]
 fn offer<B: LeafBlock>(block: &B, lane: usize, space: &Space<'_>, seeker: &mut dyn Seeker) -> bool {
-    block.near(lane, &space.place).is_some_and(|near| {
+    let near = || block.near(lane, &space.place);
+    if let Some(reach) = seeker.of_reach() {
+        reach.measure(B::KIND, &space.place, near, || block.bounds(lane));
+        return false;
+    }
+    near().is_some_and(|near| {
         seeker.offer(Candidate {
             near,
             id: block.id(lane),

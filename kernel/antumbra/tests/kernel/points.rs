@@ -73,6 +73,8 @@ fn check(bvh: &Bvh, brute: &Brute, points: &[[f32; 3]], rng: &mut Rng, place: &s
     for (index, &point) in points.iter().enumerate() {
         let (limit, radius) = (limits[index], radii[index]);
         let place = format!("{place}, {point:?}");
+        let offsets = [bvh.origin_offset(point), brute.origin_offset(point)];
+        assert_eq!(offsets[0].to_bits(), offsets[1].to_bits(), "{place}");
         let one = bvh.closest(point, limit);
         assert_eq!(one.as_ref().map(bits), closest[index].as_ref().map(bits));
         let distance = brute.signed_distance(point).to_bits();
