@@ -112,7 +112,9 @@ enum {
     /* The system started no threads. */
     ANTUMBRA_NO_THREADS = 10,
     /* A mistake of the library. Please report it. */
-    ANTUMBRA_INTERNAL = 11
+    ANTUMBRA_INTERNAL = 11,
+    /* There is no memory for what the call would make. Nothing was changed. */
+    ANTUMBRA_NO_MEMORY = 12
 };
 
 /* Version of the library, such as "0.1.0". The text lives as long as the program. */
@@ -548,7 +550,7 @@ typedef struct antumbra_object antumbra_object;
 
 /* Builds a tree over a scene. An empty scene is fine. `options` may be NULL.
  *
- * Errors: INVALID_ARGUMENT, BAD_GEOMETRY, TOO_MANY, CANCELLED. */
+ * Errors: INVALID_ARGUMENT, BAD_GEOMETRY, TOO_MANY, NO_MEMORY, CANCELLED. */
 ANTUMBRA_API antumbra_status antumbra_bvh_build(const antumbra_scene *scene, const antumbra_build *options, antumbra_bvh **bvh);
 
 /* An object in a world. 56 bytes. */

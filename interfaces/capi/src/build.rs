@@ -176,7 +176,7 @@ pub unsafe extern "C" fn antumbra_bvh_build_instances(
         };
         let geometries = ground.map(Scene::geometries).unwrap_or_default();
         let of_objects: Vec<_> = objects.iter().map(|scene| scene.geometries()).collect();
-        let (placed, instance_masks) = instances_of(&instances);
+        let (placed, instance_masks) = instances_of(&instances)?;
         let primitives = Primitives::with_instances(&geometries, &of_objects, &placed)?;
         let mut bvh = options.run((&primitives).into(), Build::bvh)?;
         let masks = Masks::new()

@@ -7,7 +7,7 @@ use antumbra::{Bvh, Hit, HitLists, Ray, Visit};
 
 use crate::arrays::{Answers, Slot, shared, take_back};
 use crate::batch::{BatchOptions, PIECE, Rays};
-use crate::status::{Failure, Status, guarded};
+use crate::status::{Failure, Status, guarded, if_no_memory};
 
 type OnHit = extern "C" fn(*mut c_void, usize, *const Hit) -> i32;
 
@@ -114,6 +114,12 @@ pub unsafe extern "C" fn antumbra_all_hits(
             let slot = Slot::handle(lists, "lists")?;
             (shared(bvh, "bvh")?, Rays::new(batch)?, slot)
         };
+        // A hit for each ray, and where its list ends.
+        if_no_memory(
+            rays.count(),
+            size_of::<Hit>() + size_of::<usize>(),
+            "lists of hits",
+        )?;
         let place = rays.place();
         let lists = place.run(|| {
             let range = 0..rays.count();

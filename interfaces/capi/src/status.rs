@@ -37,11 +37,13 @@ pub enum Status {
     NoThreads = 10,
     /// A mistake of the library.
     Internal = 11,
+    /// There is no memory for it.
+    NoMemory = 12,
 }
 
 impl Status {
     /// Every code.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Ok,
         Self::InvalidArgument,
         Self::BadGeometry,
@@ -54,6 +56,7 @@ impl Status {
         Self::Io,
         Self::NoThreads,
         Self::Internal,
+        Self::NoMemory,
     ];
 
     fn words(self) -> &'static CStr {
@@ -70,6 +73,7 @@ impl Status {
             Self::Io => c"input or output failed",
             Self::NoThreads => c"threads could not be started",
             Self::Internal => c"internal error",
+            Self::NoMemory => c"out of memory",
         }
     }
 }
@@ -111,6 +115,7 @@ impl From<Error> for Failure {
             | Error::QuadIndexOutOfRange { .. }
             | Error::ObjectOutOfRange { .. } => Status::BadGeometry,
             Error::TooMany { .. } => Status::TooMany,
+            Error::OutOfMemory { .. } => Status::NoMemory,
             Error::TooShort { .. } => Status::InvalidArgument,
             Error::OtherFunctions { .. } => Status::OtherFunctions,
             Error::Unreadable { .. } => Status::Unreadable,
@@ -128,6 +133,18 @@ impl From<Error> for Failure {
 
 /// Result of a call before it becomes a code.
 pub type Outcome<T = ()> = Result<T, Failure>;
+
+/// Fails if there is no memory for lists of the library's own.
+pub fn if_no_memory(items: usize, each: usize, what: &str) -> Outcome {
+    let bytes = items.saturating_mul(each);
+    let mut room = Vec::<u8>::new();
+    let answer = room.try_reserve_exact(bytes);
+    std::hint::black_box(&mut room);
+    answer.map_err(|_| {
+        let text = format!("not enough memory for {items} {what}: {bytes} bytes");
+        Failure::new(Status::NoMemory, text)
+    })
+}
 
 thread_local! {
     /// Text of the last failure on this thread.

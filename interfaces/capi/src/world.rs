@@ -5,7 +5,7 @@ use antumbra::{Bvh, INVALID_ID, Instance, Masks, Object, World};
 use crate::arrays::{Items, Plain, Slot, exclusive, handles, optional, shared, take_back};
 use crate::build::OwnObject;
 use crate::scene::Scene;
-use crate::status::{Failure, Outcome, Status, guarded};
+use crate::status::{Failure, Outcome, Status, guarded, if_no_memory};
 use crate::threads::{Place, Threads};
 
 /// An instance of the caller, `antumbra_instance`.
@@ -28,7 +28,8 @@ pub struct OwnWorld {
 }
 
 /// Instances for the kernel, and their masks; no masks if all have all bits.
-pub fn instances_of(placed: &Items<'_, Placed>) -> (Vec<Instance>, Vec<u32>) {
+pub fn instances_of(placed: &Items<'_, Placed>) -> Outcome<(Vec<Instance>, Vec<u32>)> {
+    if_no_memory(placed.iter().len(), 2 * size_of::<Instance>(), "instances")?;
     let instances = placed.iter().map(|placed| {
         let [a, b, c, d, e, f, g, h, i, j, k, l] = placed.transform;
         Instance::new(placed.object, [[a, b, c, d], [e, f, g, h], [i, j, k, l]])
@@ -37,7 +38,7 @@ pub fn instances_of(placed: &Items<'_, Placed>) -> (Vec<Instance>, Vec<u32>) {
         true => Vec::new(),
         false => placed.iter().map(|placed| placed.mask).collect(),
     };
-    (instances.collect(), masks)
+    Ok((instances.collect(), masks))
 }
 
 /// Whether anything has a mask.
@@ -91,7 +92,7 @@ pub unsafe extern "C" fn antumbra_world_new(
             (slot, ground, objects, instances, Place::of(threads)?)
         };
         let kernel_objects: Vec<&Object> = objects.iter().map(|object| &object.object).collect();
-        let (placed, instance_masks) = instances_of(&instances);
+        let (placed, instance_masks) = instances_of(&instances)?;
         let world = place.run(|| match ground {
             Some(ground) => World::on_ground(&ground.object, &kernel_objects, &placed),
             None => World::new(&kernel_objects, &placed),
@@ -189,7 +190,7 @@ fn change(
     instances: &Items<'_, Placed>,
     place: Place<'_>,
 ) -> Outcome {
-    let (placed, masks) = instances_of(instances);
+    let (placed, masks) = instances_of(instances)?;
     let geometries: Vec<_> = moved.iter().map(|(_, scene)| scene.geometries()).collect();
     let moved: Vec<_> = (moved.iter().zip(&geometries))
         .map(|((object, _), geometries)| (*object, &geometries[..]))

@@ -51,6 +51,7 @@ pub enum ErrorCode {
     Unknown = 1,
     InvalidArgument = 2,
     InvalidOperation = 3,
+    OutOfMemory = 4,
     Cancelled = 6,
 }
 

@@ -37,7 +37,7 @@ impl Handle for Buffer {
 impl Buffer {
     /// New memory, filled with zeros.
     pub fn new(device: Arc<Device>, size: usize) -> Outcome<Arc<Self>> {
-        let out_of_memory = || Failure::new(ErrorCode::Unknown, "a buffer is too large");
+        let out_of_memory = || Failure::new(ErrorCode::OutOfMemory, "a buffer is too large");
         let bytes = size.checked_add(PADDING).ok_or_else(out_of_memory)?;
         let layout = Layout::from_size_align(bytes, ALIGN).map_err(|_| out_of_memory())?;
         device.count_memory(bytes as isize)?;

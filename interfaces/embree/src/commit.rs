@@ -8,7 +8,9 @@ use antumbra::{
     Build, BuildMonitor, Bvh, Geometry as Kernel, Hit, Instance, Masks, Object, Recipe, World,
 };
 
-use crate::abi::{Bounds, INVALID, ProgressFunction, RtcRay, SCENE_DYNAMIC, SCENE_ROBUST};
+use crate::abi::{
+    Bounds, ErrorCode, INVALID, ProgressFunction, RtcRay, SCENE_DYNAMIC, SCENE_ROBUST,
+};
 use crate::buffer::View;
 use crate::curves;
 use crate::device::{Callback, Device};
@@ -327,6 +329,10 @@ impl Instances {
                 Some(scene) => Some(self.object(scene, own)?),
                 None => None,
             });
+        }
+        if self.placed.try_reserve(count).is_err() {
+            let text = format!("not enough memory for {count} instances");
+            return Err(Failure::new(ErrorCode::OutOfMemory, text));
         }
         for prim in 0..count {
             let which = match (&state.index, is_array) {

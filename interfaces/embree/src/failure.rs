@@ -37,6 +37,7 @@ impl From<antumbra::Error> for Failure {
     fn from(error: antumbra::Error) -> Self {
         let code = match &error {
             antumbra::Error::Cancelled => ErrorCode::Cancelled,
+            antumbra::Error::OutOfMemory { .. } => ErrorCode::OutOfMemory,
             _ => ErrorCode::InvalidOperation,
         };
         Self::new(code, error.to_string())

@@ -6,13 +6,17 @@ use crate::device::Device;
 use crate::failure::{Failure, report};
 use crate::geometry::Geometry;
 use crate::handle::{Handle, device_of};
+use crate::user::report_to_running;
+
+fn unsupported(name: &str) -> Failure {
+    Failure::operation(format!("{name} is not supported"))
+}
 
 /// # Safety
 /// A handle of this library, or null.
 unsafe fn refuse<T: Handle>(name: &str, handle: *const T) -> *const c_void {
-    let failure = Failure::operation(format!("{name} is not supported"));
     // SAFETY: the caller's handle.
-    report(unsafe { device_of(handle) }, &failure);
+    report(unsafe { device_of(handle) }, &unsupported(name));
     std::ptr::null()
 }
 
@@ -26,6 +30,14 @@ macro_rules! missing {
             unsafe { refuse(stringify!($name), handle) }
         }
     )*)*};
+    // Functions that a user geometry's function calls, with arguments of its own: the failure belongs to its device.
+    (forwards: $($name:ident)*) => {$(
+        #[unsafe(no_mangle)]
+        pub extern "C" fn $name() -> *const c_void {
+            report_to_running(&unsupported(stringify!($name)));
+            std::ptr::null()
+        }
+    )*};
     // Functions whose first argument is no handle: the failure belongs to the thread.
     ($($name:ident)*) => {$(
         #[unsafe(no_mangle)]
@@ -47,6 +59,10 @@ missing! {
 
 missing! {
     rtcBuildBVH rtcCollide rtcMakeStaticBVH rtcReleaseBVH rtcRetainBVH rtcThreadLocalAlloc
+}
+
+missing! {
+    forwards:
     rtcForwardIntersect1 rtcForwardIntersect1Ex rtcForwardIntersect4 rtcForwardIntersect4Ex rtcForwardIntersect8
     rtcForwardIntersect8Ex rtcForwardIntersect16 rtcForwardIntersect16Ex rtcForwardOccluded1 rtcForwardOccluded1Ex
     rtcForwardOccluded4 rtcForwardOccluded4Ex rtcForwardOccluded8 rtcForwardOccluded8Ex rtcForwardOccluded16

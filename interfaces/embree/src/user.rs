@@ -17,8 +17,10 @@ use crate::abi::{
     RtcHit, RtcRay, RtcRayHit, UserArguments,
 };
 use crate::commit::Placed;
+use crate::failure::{Failure, report};
 use crate::filter::{Filters, Query};
 use crate::geometry::Geometry;
+use crate::handle::Handle;
 
 /// A query that is running.
 pub struct Current<'a> {
@@ -53,6 +55,15 @@ impl Current<'_> {
 
 thread_local! {
     static CURRENT: Cell<*const c_void> = const { Cell::new(ptr::null()) };
+    /// The geometry whose function is running.
+    static RUNNING: Cell<*const Geometry> = const { Cell::new(ptr::null()) };
+}
+
+/// Reports a failure to the device of the geometry whose function is running on this thread, if there is one.
+pub fn report_to_running(failure: &Failure) {
+    // SAFETY: `UserShape::call` keeps the geometry alive while its function runs.
+    let geometry = unsafe { RUNNING.get().as_ref() };
+    report(geometry.and_then(Geometry::device), failure);
 }
 
 /// Runs a query while functions can see it.
@@ -145,8 +156,10 @@ impl UserShape {
             shape: self,
             current,
         };
+        let before = RUNNING.replace(Arc::as_ptr(&self.geometry));
         // SAFETY: the client's function, with arguments as documented; `Call` begins with them.
         unsafe { function((&raw const call).cast()) };
+        RUNNING.set(before);
         Some(rayhit)
     }
 }

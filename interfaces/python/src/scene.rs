@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use antumbra::{Build, BuildReport, Bvh, LocalOrigin, Ray, Recipe, World};
-use pyo3::exceptions::{PyIndexError, PyOSError, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyMemoryError, PyOSError, PyValueError};
 use pyo3::prelude::*;
 
 use crate::DegenerateWarning;
@@ -153,12 +153,10 @@ pub fn raised(error: antumbra::Error) -> PyErr {
             PyIndexError::new_err(error.to_string())
         }
         antumbra::Error::Io { .. } => PyOSError::new_err(error.to_string()),
+        antumbra::Error::OutOfMemory { .. } => PyMemoryError::new_err(error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
     }
 }
-
-/// Bytes that the kernel takes for each triangle, instance and training ray while it builds, as measured, and some more.
-const BUILD_BYTES: [usize; 3] = [160, 1000, 1100];
 
 /// Builds the tree of a scene.
 pub fn build(
@@ -168,12 +166,6 @@ pub fn build(
     quality: Quality,
     call: &mut Call<'_>,
 ) -> PyResult<Arc<SceneData>> {
-    let triangles = parts.parts.iter().map(|part| part.len()).sum();
-    let counts = [triangles, parts.instances.len(), rays.len()];
-    let names = ["triangles", "instances", "training rays"];
-    for ((count, bytes), name) in counts.into_iter().zip(BUILD_BYTES).zip(names) {
-        memory::check(count, bytes, name)?;
-    }
     let made = watch(py, &call.threads, &mut call.progress, |signals| {
         let primitives = parts.primitives()?;
         let bvh = Build::new(&primitives)

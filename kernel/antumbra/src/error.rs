@@ -67,6 +67,15 @@ pub enum Error {
         /// How many there may be.
         limit: usize,
     },
+    /// There is no memory for a build. Found before it begins, by what such things take at most while a tree is built.
+    OutOfMemory {
+        /// Plural of the things that need it.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// Bytes that are needed.
+        bytes: usize,
+    },
     /// A column of rays has too few numbers.
     TooShort {
         /// Plural of what the column holds.
@@ -247,6 +256,9 @@ impl fmt::Display for Error {
                 f,
                 "{found} {what} are more than the {limit} that can be numbered"
             ),
+            Self::OutOfMemory { what, found, bytes } => {
+                write!(f, "not enough memory for {found} {what}: {bytes} bytes")
+            }
             Self::TooShort {
                 what,
                 needed,
@@ -371,6 +383,17 @@ impl From<std::io::Error> for Error {
 }
 
 impl Error {
+    /// Fails if there is no memory for things that take so many bytes each. What is reserved here is given back at once: it is a
+    /// question that can be answered with no, where a list that grows would end the process.
+    pub(crate) fn if_no_memory(what: &'static str, found: usize, each: usize) -> Result<(), Self> {
+        let bytes = found.saturating_mul(each);
+        let mut room = Vec::<u8>::new();
+        let answer = room.try_reserve_exact(bytes);
+        // Or the compiler would leave the question out.
+        core::hint::black_box(&mut room);
+        answer.map_err(|_| Self::OutOfMemory { what, found, bytes })
+    }
+
     /// Fails if something moves where nothing may.
     pub(crate) fn if_moves(moves: bool, why: &'static str) -> Result<(), Self> {
         match moves {

@@ -53,6 +53,11 @@ fn threads_progress_and_cancelling() {
 }
 
 #[test]
+fn no_memory_is_a_status() {
+    program(Language::C99, "c/memory.c");
+}
+
+#[test]
 fn every_mistake_is_an_error() {
     program(Language::C99, "c/errors.c");
 }

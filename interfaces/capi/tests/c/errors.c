@@ -33,10 +33,10 @@ int main(void) {
 
     CHECK(strcmp(antumbra_last_error(), "") == 0);
     CHECK(strncmp(antumbra_version(), "0.1.", 4) == 0);
-    for (status = 0; status <= 11; ++status) {
+    for (status = 0; status <= 12; ++status) {
         CHECK(strcmp(antumbra_status_text((int32_t)status), "unknown status") != 0);
     }
-    CHECK(strcmp(antumbra_status_text(12), "unknown status") == 0);
+    CHECK(strcmp(antumbra_status_text(13), "unknown status") == 0);
     CHECK(strcmp(antumbra_status_text(-1), "unknown status") == 0);
 
     /* Scenes. */

@@ -7,6 +7,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 typedef struct { _Alignas(16) float org[3]; float tnear, dir[3], time, tfar; unsigned mask, id, flags; } Ray;
@@ -35,6 +37,7 @@ void rtcSetGeometryIntersectFilterFunction(void *, void (*)(const FilterArgs *))
 void rtcSetGeometryUserPrimitiveCount(void *, unsigned); void rtcSetGeometryBoundsFunction(void *, void (*)(const BoundsArgs *), void *);
 void rtcSetGeometryIntersectFunction(void *, void (*)(const UserArgs *)); void rtcSetGeometryOccludedFunction(void *, void (*)(const UserArgs *));
 void rtcIntersect1(void *, RayHit *, void *); void rtcOccluded1(void *, Ray *, void *);
+void rtcForwardIntersect1(const UserArgs *, void *, Ray *); void rtcForwardOccluded1(const UserArgs *, void *, Ray *);
 void rtcOccluded16(const int *, void *, Ray16 *, void *);
 void rtcOccluded1M(void *, Context *, Ray *, unsigned, size_t); void rtcIntersect1M(void *, Context *, RayHit *, unsigned, size_t);
 bool rtcPointQuery(void *, PointQuery *, PointContext *, bool (*)(PointArgs *), void *);
@@ -201,7 +204,9 @@ static bool plate(const UserArgs *args, Ray *r, float *t) {
     *t = (((const float *)args->user)[args->prim] - r->org[2]) / r->dir[2];
     return args->valid[0] && r->tnear <= *t && *t <= r->tfar;
 }
+static bool forwards;
 static void plate_intersect(const UserArgs *args) {
+    if (forwards) rtcForwardIntersect1(args, NULL, args->ray);
     RayHit *r = args->ray;
     float t;
     if (!plate(args, &r->ray, &t)) return;
@@ -209,6 +214,7 @@ static void plate_intersect(const UserArgs *args) {
     r->hit = (Hit){{0, 0, 5}, 0.25f, 0.5f, args->prim, args->geom, args->context->inst, ~0u};
 }
 static void plate_occluded(const UserArgs *args) {
+    if (forwards) rtcForwardOccluded1(args, NULL, args->ray);
     Ray *r = args->ray;
     float t;
     if (plate(args, r, &t)) r->tfar = -INFINITY;
@@ -243,6 +249,16 @@ static void user_geometry_and_points(void *device) {
     down.dir[2] = -1;
     rtcOccluded1(scene, &down, NULL);
     CHECK(down.tfar == -INFINITY);
+    /* What is not there is reported to the device of the query. */
+    forwards = true;
+    CHECK(rtcGetDeviceError(device) == 0);
+    rtcIntersect1(scene, &hit, NULL);
+    CHECK(rtcGetDeviceError(device) == 3);
+    CHECK(strstr(rtcGetDeviceLastErrorMessage(device), "rtcForwardIntersect1") != NULL);
+    up.tfar = 10;
+    rtcOccluded1(scene, &up, NULL);
+    CHECK(rtcGetDeviceError(device) == 3);
+    forwards = false;
     PointQuery query = {{0.5f, 0.5f, 1.4f}, 0, 10};
     PointContext context;
     unsigned near = 9;
@@ -403,6 +419,27 @@ static void each_other(void *device) {
     for (int i = 0; i < 2; ++i) rtcReleaseScene(scenes[i]);
 }
 
+/* A scene for which there is no memory is error 4, and the device lives. Nothing is ever written to the indices. */
+static void memory(void *device) {
+    const struct rlimit limit = {8000000000u, 8000000000u};
+    const size_t count = 100000000;
+    static const float corners[9] = {0, 0, 1, 1, 0, 1, 0, 1, 1};
+    void *indices = mmap(NULL, count * 12, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0);
+    void *scene = rtcNewScene(device), *geometry = rtcNewGeometry(device, 0);
+    CHECK(indices != MAP_FAILED && setrlimit(RLIMIT_AS, &limit) == 0);
+    rtcSetSharedGeometryBuffer(geometry, 1, 0, FLOAT3, corners, 0, 12, 3);
+    rtcSetSharedGeometryBuffer(geometry, 0, 0, UINT3, indices, 0, 12, count);
+    rtcCommitGeometry(geometry);
+    rtcAttachGeometry(scene, geometry);
+    CHECK(rtcGetDeviceError(device) == 0);
+    rtcCommitScene(scene);
+    CHECK(rtcGetDeviceError(device) == 4);
+    CHECK(strstr(rtcGetDeviceLastErrorMessage(device), "not enough memory") != NULL);
+    CHECK(rtcSetNewGeometryBuffer(geometry, 1, 1, FLOAT3, 12, (size_t)1 << 31) == NULL && rtcGetDeviceError(device) == 4);
+    rtcReleaseGeometry(geometry);
+    rtcReleaseScene(scene);
+}
+
 int main(void) {
     void *device = rtcNewDevice("threads=2,isa=avx2");
     CHECK(device != NULL);
@@ -414,6 +451,7 @@ int main(void) {
     CHECK(rtcGetDeviceError(device) == 0);
     each_other(device);
     errors(device);
+    memory(device);
     rtcReleaseDevice(device);
     puts("door: ok");
     return 0;

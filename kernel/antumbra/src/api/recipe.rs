@@ -201,7 +201,7 @@ impl Recipe {
         self
     }
 
-    /// Sets the number of surface rays. `None`, the default, is a number that suits the size of the scene.
+    /// Sets the number of surface rays, at most 2²⁴. `None`, the default, is a number that suits the size of the scene.
     pub fn surface_rays(mut self, count: Option<usize>) -> Self {
         self.training.surface_rays = count;
         self

@@ -266,6 +266,7 @@ impl BinaryStage {
         recipe: &Recipe,
         monitor: &dyn BuildMonitor,
     ) -> Result<Bvh, Error> {
+        check_training(rays, recipe)?;
         let mut bvh = self.collapse(primitives, rays, recipe, monitor)?;
         reached(0.8, monitor)?;
         let training = order_rays(primitives, rays, recipe);
@@ -280,6 +281,25 @@ impl BinaryStage {
         monitor.progress(1.0);
         Ok(bvh)
     }
+}
+
+/// More surface rays teach nothing, and a mistaken number would fill the memory.
+const MOST_SURFACE_RAYS: usize = 1 << 24;
+
+/// Bytes that learning takes for each training ray, as measured, and some more.
+const TRAINING_BYTES: usize = 1100;
+
+/// Fails if there are more surface rays than are of use, or more training rays than there is memory for.
+fn check_training(rays: &[Ray], recipe: &Recipe) -> Result<(), Error> {
+    let found = recipe.training.surface_rays.unwrap_or(0);
+    if found > MOST_SURFACE_RAYS {
+        return Err(Error::TooMany {
+            what: "surface rays",
+            found,
+            limit: MOST_SURFACE_RAYS,
+        });
+    }
+    Error::if_no_memory("training rays", found.max(rays.len()), TRAINING_BYTES)
 }
 
 /// Rays that drive a builder.

@@ -19,7 +19,7 @@ use crate::error::Error;
 use crate::geometry::instance::{ObjectShape, Placement};
 use crate::geometry::masks::Masks;
 use crate::geometry::moved::Moved;
-use crate::geometry::primitives::{MAX_INSTANCES, Primitives};
+use crate::geometry::primitives::{INSTANCE_BYTES, MAX_INSTANCES, Primitives};
 use crate::geometry::{Geometry, Instance};
 use crate::parallel::map;
 use crate::trace::engine::Engine;
@@ -263,6 +263,7 @@ impl World {
                 limit: MAX_INSTANCES,
             });
         }
+        Error::if_no_memory("instances", instances.len(), INSTANCE_BYTES)?;
         let why = "an instance in a world of objects cannot move while rays are traced";
         (instances.iter()).try_for_each(|instance| instance.stands_still(why))?;
         let named = instances.iter().map(|instance| instance.object);

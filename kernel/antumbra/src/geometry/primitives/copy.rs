@@ -206,11 +206,15 @@ fn pieces<'a, 'g>(
     })
 }
 
-/// Fails if there is more than ids and leaf references can name.
+/// Bytes that a build takes for each primitive, as measured on triangles, and some more.
+const BUILD_BYTES: usize = 160;
+
+/// Fails if there is more than ids and leaf references can name, or than there is memory for.
 fn check_counts(geometries: &[Geometry<'_>]) -> Result<(), Error> {
     limit("geometries", geometries.len(), u32::MAX as usize)?;
     let all = geometries.iter().map(Geometry::count).sum();
     limit("primitives", all, MAX_PRIMITIVES)?;
+    Error::if_no_memory("primitives", all, BUILD_BYTES)?;
     for (name, count) in ScalarLists::counts(geometries) {
         limit(name, count, MAX_SCALARS)?;
     }

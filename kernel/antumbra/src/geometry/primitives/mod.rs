@@ -39,7 +39,7 @@ use place::asked_for;
 
 pub(crate) use kinds::Prim;
 pub use kinds::PrimKind;
-pub(crate) use place::MAX_INSTANCES;
+pub(crate) use place::{INSTANCE_BYTES, MAX_INSTANCES};
 
 /// Checked copies of all primitives that can be hit.
 ///

@@ -13,12 +13,16 @@ use crate::parallel::map;
 /// Instances that leaf references can name: two of their 2²⁹ values have another meaning.
 pub(crate) const MAX_INSTANCES: usize = (1 << 29) - 2;
 
+/// Bytes that a build takes for each instance, as measured, and some more.
+pub(crate) const INSTANCE_BYTES: usize = 1000;
+
 /// Which of `objects` objects some instance places.
 ///
 /// # Errors
 /// Too many instances; an index of an object out of range.
 pub(super) fn asked_for(instances: &[Instance], objects: usize) -> Result<Vec<bool>, Error> {
     limit("instances", instances.len(), MAX_INSTANCES)?;
+    Error::if_no_memory("instances", instances.len(), INSTANCE_BYTES)?;
     for (instance, inst_id) in instances.iter().zip(0u32..) {
         if instance.object as usize >= objects {
             return Err(Error::ObjectOutOfRange {
