@@ -380,7 +380,6 @@ SOURCES = {
     ],
     PYTHON: [
         ("glibc of 2014", "defined"),
-        ("4 cm in a scene of 10 km", "defined"),
         ("12 bytes for each vertex and 12 for each triangle", "defined"),
         ("From 32 directions and 16 385 rays on", "setting"),
         ("4 million rays, one thread", "bench/record/zen3-2026-11-26-python-groups.txt", "--rays 4000000"),
@@ -404,7 +403,6 @@ SOURCES = {
         ("1.2 m above the floor and 0.3 m above the sill", "cited"),
         ("k, by default 0.13 (Gauss)", "fields/bake/src/curvature.rs", "REFRACTION: f64 = 0.13;"),
         ("by default 6 371 008.8 m", "fields/bake/src/curvature.rs", "EARTH_RADIUS: f64 = 6_371_008.8;"),
-        ("4 cm in a scene of 10 km", "defined"),
         ("less than 1e-12 count as equal", "fields/bake/src/sweep.rs", "GRAZING: f64 = 1e-12;"),
         ("differ by 1.9 degrees at Munich", "pictures/raster/src/crs.rs", "(near.north + 1.91).abs() < 0.01"),
         ("Web Mercator (EPSG:3857)", "defined"),

@@ -30,7 +30,8 @@ pub struct Options {
     pub max_memory: MemorySize,
     /// Whether warnings about a file, such as missing materials and images of a mesh, are errors.
     pub strict: bool,
-    /// Whether materials, textures and images of mesh files are read, and missing ones warned of. Bakes use none.
+    /// Whether materials, textures and images of mesh files are read, and warnings and notes about looks are given. Bakes use
+    /// none.
     pub looks: bool,
     /// Whether features of `.pbrt` files that are not supported are left out with warnings. Otherwise they are errors.
     pub skip_unsupported: bool,
@@ -321,6 +322,7 @@ fn pbrt_options(options: &Options, origin: DVec3) -> antumbra_pbrt::Options<'_> 
         max_memory: Some(options.max_memory.bytes()),
         origin,
         skip_unsupported: options.skip_unsupported,
+        only_geometry: !options.looks,
         strict: options.strict,
     }
 }

@@ -97,6 +97,8 @@ pub struct Options<'a> {
     pub origin: DVec3,
     /// Whether unsupported features are left out with warnings. Otherwise they are errors.
     pub skip_unsupported: bool,
+    /// Whether warnings and notes about what only a picture shows are left out: materials, textures, lights, film, sampling.
+    pub only_geometry: bool,
     /// Whether names of unknown and undefined materials are errors. Otherwise they are warnings, and pbrt-v3's choice is taken.
     pub strict: bool,
 }
@@ -202,7 +204,7 @@ fn read(
     if is_version4 {
         version4::say(main_file, &mut report);
     }
-    let notes = report.finish().map_err(Error::Scene)?;
+    let notes = report.finish(options.only_geometry).map_err(Error::Scene)?;
     times.parse = start.elapsed() - times.meshes - times.images;
     Ok(Loaded {
         scene,

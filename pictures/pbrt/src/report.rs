@@ -8,6 +8,23 @@ use crate::bsdf_file::Tables;
 use crate::diagnostic::{Diagnostic, Diagnostics, Severity};
 use crate::source::{Sources, Span};
 
+/// Directives that only a picture shows.
+const LOOKS: [&str; 13] = [
+    "AreaLightSource",
+    "ColorSpace",
+    "Film",
+    "Integrator",
+    "LightSource",
+    "MakeNamedMaterial",
+    "MakeNamedMedium",
+    "Material",
+    "MediumInterface",
+    "NamedMaterial",
+    "PixelFilter",
+    "Sampler",
+    "Texture",
+];
+
 /// Largest number of diagnostics kept per severity. Further ones are only counted.
 const KEPT: usize = 100;
 
@@ -160,8 +177,8 @@ impl Report {
         true
     }
 
-    /// Returns warnings and notes if there was no mistake, and the mistakes otherwise.
-    pub fn finish(mut self) -> Result<Vec<Diagnostic>, Diagnostics> {
+    /// Returns warnings and notes if there was no mistake, and the mistakes otherwise. Perhaps only what is about geometry.
+    pub fn finish(mut self, only_geometry: bool) -> Result<Vec<Diagnostic>, Diagnostics> {
         for repeated in self.repeated.values() {
             if let (Some(place), 1..) = (repeated.place, repeated.more) {
                 let message = &mut self.errors.list[place].1.message;
@@ -169,6 +186,10 @@ impl Report {
             }
         }
         if self.error_count() == 0 {
+            if only_geometry {
+                let sources = &self.sources;
+                (self.notes.list).retain(|(span, _)| !LOOKS.contains(&sources.directive(*span)));
+            }
             return Ok(self.notes.sorted());
         }
         Err(Diagnostics {

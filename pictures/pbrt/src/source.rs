@@ -10,6 +10,8 @@ use std::sync::Arc;
 
 use flate2::read::MultiGzDecoder;
 
+use crate::names::DIRECTIVES;
+
 /// Place in a file: a token or a part of one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Span {
@@ -152,6 +154,19 @@ impl Sources {
         let start = (span.offset as usize).min(bytes.len());
         let end = (start + span.len as usize).min(bytes.len());
         &bytes[start..end]
+    }
+
+    /// Directive that a span belongs to: the last one that begins up to its end, or none.
+    pub fn directive(&self, span: Span) -> &'static str {
+        let bytes = &self.file(span.file).bytes;
+        let end = (span.offset as usize + span.len as usize).min(bytes.len());
+        let words = bytes[..end].rsplit(u8::is_ascii_whitespace);
+        let mut known = words.filter_map(|word| {
+            let name = std::str::from_utf8(word).ok()?;
+            let place = DIRECTIVES.binary_search(&name).ok()?;
+            Some(DIRECTIVES[place])
+        });
+        known.next().unwrap_or_default()
     }
 
     /// Line of a span for a diagnostic, with its column and the position of the caret.

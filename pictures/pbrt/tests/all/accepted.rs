@@ -1,6 +1,8 @@
 //! Valid files, and the scene of each.
 
-use antumbra_pbrt::Severity;
+use std::path::Path;
+
+use antumbra_pbrt::{Options, Severity, parse};
 use antumbra_scene::{
     Accelerator, DirectStrategy, Filter, Geometry, Integrator, Light, LightStrategy, Material,
     Pigment, Projection, Rgb, SamplerKind, Shape, TriangleMesh,
@@ -626,6 +628,33 @@ fn what_pbrt_goes_on_after_is_a_warning() {
     assert_eq!(*kd, Rgb::X.into());
     assert_eq!(material(1), material(0), "the material before it stays");
     assert!(matches!(material(2), Material::Mix { .. }));
+}
+
+/// Where nobody sees the looks, nothing is said of them: also where a shape is on the same line.
+#[test]
+fn only_geometry_is_spoken_of_where_nothing_else_is_wanted() {
+    let text = format!(
+        r#"Integrator "sppm"
+        WorldBegin
+        Material "velvet" "rgb Kd" [1 0 0] {TRIANGLE}
+        Material "matte" Shape "hyperboloid" "point p1" [1 0 0.6] "point p2" [5 0 1] {TRIANGLE}
+        NamedMaterial "nowhere" {TRIANGLE}
+        AttributeBegin Scale 1 2 1 LightSource "spot" AttributeEnd
+        WorldEnd"#
+    );
+    let said = |only_geometry: bool| -> Vec<u32> {
+        let options = Options {
+            strict: false,
+            skip_unsupported: true,
+            only_geometry,
+            ..crate::OPTIONS
+        };
+        let loaded = parse(text.clone().into_bytes(), Path::new("s.pbrt"), &options);
+        let notes = loaded.expect("a scene").notes;
+        notes.iter().map(|note| note.line).collect()
+    };
+    assert_eq!(said(false), [1, 3, 4, 5, 6]);
+    assert_eq!(said(true), [4]);
 }
 
 #[test]

@@ -46,6 +46,7 @@ const OPTIONS: Options = Options {
     max_memory: None,
     origin: glam::DVec3::ZERO,
     skip_unsupported: false,
+    only_geometry: false,
     strict: true,
 };
 
