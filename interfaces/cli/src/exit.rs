@@ -190,10 +190,16 @@ pub fn is_terminal() -> bool {
     io::stderr().is_terminal()
 }
 
+/// A text without characters that a terminal obeys, which names of files may have.
+fn printable(text: &str) -> String {
+    let is_obeyed = |c: char| c.is_control() && c != '\n' && c != '\t';
+    text.replace(is_obeyed, "\u{fffd}")
+}
+
 /// Prints an error, a requested text or, unless `-q` is given, a warning. On a terminal long lines are broken between words.
 /// Nobody may be listening: failing to say it is no failure.
 pub fn say(text: fmt::Arguments<'_>) {
-    let text = text.to_string();
+    let text = printable(&text.to_string());
     if is_quiet() && text.starts_with("warning: ") {
         return;
     }
@@ -230,10 +236,11 @@ pub fn draw(line: &Line) {
         return;
     }
     if is_terminal() {
-        let _ = write!(out, "\r{:<COLUMNS$}", line.bar()).and_then(|()| out.flush());
+        let bar = printable(&line.bar());
+        let _ = write!(out, "\r{bar:<COLUMNS$}").and_then(|()| out.flush());
         *drawn = true;
     } else {
-        let _ = writeln!(out, "{}", line.log());
+        let _ = writeln!(out, "{}", printable(&line.log()));
     }
 }
 

@@ -96,8 +96,12 @@ pub fn coloured(
     ply(path, name, &mesh)
 }
 
-/// A text as a field of a .csv.
+/// A text as a field of a .csv. What a spreadsheet would take for a formula gets an apostrophe, such as the name of an
+/// object in a stranger's model.
 pub fn field(text: &str) -> Cow<'_, str> {
+    if text.starts_with(['=', '+', '-', '@', '\t', '\r']) && text.parse::<f64>().is_err() {
+        return Cow::Owned(field(&format!("'{text}")).into_owned());
+    }
     match text.contains([',', '"', '\n', '\r']) {
         true => Cow::Owned(format!("\"{}\"", text.replace('"', "\"\""))),
         false => Cow::Borrowed(text),

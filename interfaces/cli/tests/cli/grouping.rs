@@ -324,6 +324,23 @@ fn energies_are_means_times_areas() {
     }
 }
 
+/// Names of a stranger's file do nothing in a spreadsheet or a terminal.
+#[test]
+fn names_are_only_read() {
+    let place = village();
+    let text = fs::read_to_string(place.path("village.obj")).expect("a model");
+    place.write("a\u{1b}[31m.obj", text.replace("o mill", "o =1+1"));
+    let flags = ["sun", "a\u{1b}[31m.obj", "-o", "sun.csv", "--surfaces", "2"];
+    let groups = ["--groups", "objects.csv", "--by", "object"];
+    let ran = place.run(&[&flags[..], &groups, &DAY].concat()).expect(0);
+    let names: Vec<String> = table(&place, "objects.csv")
+        .into_iter()
+        .map(|mut row| row.swap_remove(0))
+        .collect();
+    assert!(names.contains(&"'=1+1".to_owned()), "{names:?}");
+    assert!(!ran.stderr.contains('\u{1b}') && ran.stderr.contains("a\u{fffd}[31m"));
+}
+
 #[test]
 fn objects_that_are_not_there_are_named() {
     let place = village();
