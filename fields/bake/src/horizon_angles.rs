@@ -74,21 +74,17 @@ impl HorizonJob {
         })
     }
 
-    /// The ray of a sensor in a direction; `None` if the plane of its normal is in the way.
-    fn ray(&self, bvh: &Bvh, item: usize, direction: [f64; 3]) -> Option<Ray> {
+    /// A ray of a sensor, in no direction yet, and its normal.
+    fn start(&self, bvh: &Bvh, item: usize) -> (Ray, Option<[f64; 3]>) {
         let point = self.places.points[item];
-        let dir = direction.map(|x| x as f32);
-        match self.places.normals.get(item) {
-            None => Some(Ray {
-                tnear: bvh.origin_offset(point),
-                ..Ray::new(point, dir)
-            }),
-            Some(normal) => {
-                let normal = unit(normal.map(f64::from))?;
-                let is_above = dot(normal, dir.map(f64::from)) > 0.0;
-                is_above.then(|| Ray::new(above(bvh, &point, normal), dir))
-            }
-        }
+        let normal = self.places.normals.get(item);
+        let normal = normal.map(|normal| unit(normal.map(f64::from)).unwrap_or_default());
+        let (org, tnear) = match normal {
+            None => (point, bvh.origin_offset(point)),
+            Some(normal) => (above(bvh, &point, normal), 0.0),
+        };
+        let ray = Ray::new(org, [0.0; 3]);
+        (Ray { tnear, ..ray }, normal)
     }
 
     /// Whether a sensor has a place and faces somewhere.
@@ -100,6 +96,8 @@ impl HorizonJob {
 
     /// Moves the ends of each pair, a closed and an open elevation, to each other.
     fn halve(&self, bvh: &Bvh, first: usize, ends: &mut [[f64; 2]]) {
+        let items = first..first + ends.len() / self.azimuths.len();
+        let starts: Vec<_> = items.map(|item| self.start(bvh, item)).collect();
         let mut open: Vec<(usize, Ray)> = Vec::with_capacity(ends.len());
         let (mut rays, mut hits) = (Vec::new(), Vec::new());
         for _ in 0..HALVINGS {
@@ -111,10 +109,12 @@ impl HorizonJob {
                 let middle = 0.5 * (*closed + *open_end);
                 let azimuth = self.azimuths[index % self.azimuths.len()];
                 let direction = self.orientation.direction(azimuth, middle);
-                let item = first + index / self.azimuths.len();
-                match self.ray(bvh, item, direction) {
-                    Some(ray) => open.push((index, ray)),
-                    None => *closed = middle,
+                let dir = direction.map(|x| x as f32);
+                let (start, normal) = starts[index / self.azimuths.len()];
+                // The plane of its normal may be in the way.
+                match normal.is_none_or(|normal| dot(normal, dir.map(f64::from)) > 0.0) {
+                    true => open.push((index, Ray { dir, ..start })),
+                    false => *closed = middle,
                 }
             }
             rays.clear();

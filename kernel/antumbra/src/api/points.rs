@@ -17,6 +17,10 @@ use crate::trace::inside::{self, Around};
 use crate::trace::memory::Memory;
 use crate::trace::nearest::{Candidate, Nearest, Reach, Seeker, Within};
 
+/// A scene that reaches no more than so many times as far as a point has the offset of its box there: it costs no search, and
+/// rays do not visit the leaf that they leave.
+const NEAR: f32 = 4.0;
+
 /// Points that one thread takes at a time.
 const CHUNK: usize = 64;
 
@@ -149,8 +153,8 @@ impl Bvh {
     /// not hide what is around it.
     ///
     /// It is [`Aabb::origin_offset`](crate::Aabb::origin_offset) of a box that holds the point and the primitives on which the point lies:
-    /// 4 millionths of the largest coordinate. Nothing else of the scene has a say, so what is near is as sharp in a scene of
-    /// 40 km as in one of 200 m. 0 for a point with a NaN or infinite coordinate.
+    /// 4 millionths of the largest coordinate. Nothing that is farther away than four times the point's largest coordinate has a
+    /// say, so what is near is as sharp in a scene of 40 km as in one of 200 m. 0 for a point with a NaN or infinite coordinate.
     ///
     /// Why that is enough: let `u = 2⁻²⁴`, and let `m` be the largest coordinate. A point that was computed from a surface is off it
     /// by a rounding or two of each coordinate, within `8 u m`, which is what "lies on" means here. Moving it along the normal
@@ -178,7 +182,7 @@ impl Bvh {
     #[must_use]
     pub fn origin_offset(&self, point: impl Into<[f32; 3]>) -> f32 {
         let point = point.into();
-        origin_offset(point, |reach| {
+        origin_offset(point, self.tree.reach, |reach| {
             self.pool.with(|memory| self.seek(memory, point, reach));
         })
     }
@@ -422,7 +426,7 @@ impl Brute {
     #[must_use]
     pub fn origin_offset(&self, point: impl Into<[f32; 3]>) -> f32 {
         let point = point.into();
-        origin_offset(point, |reach| {
+        origin_offset(point, self.reach(), |reach| {
             brute_points::offer_all(self.primitives(), point, reach);
         })
     }
@@ -501,16 +505,18 @@ fn within_by(point: [f32; 3], radius: f32, seek: impl FnOnce(&mut Within)) -> Ve
     within.sorted().iter().map(ClosestPoint::new).collect()
 }
 
-/// See [`Bvh::origin_offset`].
-fn origin_offset(point: [f32; 3], seek: impl FnOnce(&mut Reach)) -> f32 {
+/// See [`Bvh::origin_offset`]. `extent` is the largest coordinate of the scene.
+fn origin_offset(point: [f32; 3], extent: f32, seek: impl FnOnce(&mut Reach)) -> f32 {
     if !is_finite(point) {
         return 0.0;
     }
-    let most = f64::from(
-        point
-            .into_iter()
-            .fold(0.0, |most: f32, x| most.max(x.abs())),
-    );
+    let most = point
+        .into_iter()
+        .fold(0.0, |most: f32, x| most.max(x.abs()));
+    if extent <= NEAR * most {
+        return extent.max(most) * ORIGIN_OFFSET;
+    }
+    let most = f64::from(most);
     let mut reach = Reach {
         distance: most / (1 << 21) as f64,
         reach: most,

@@ -62,6 +62,10 @@ impl Brute {
         }
     }
 
+    pub(crate) fn reach(&self) -> f32 {
+        self.reach
+    }
+
     pub(crate) fn primitives(&self) -> &Primitives {
         &self.primitives
     }
