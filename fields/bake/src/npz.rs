@@ -3,6 +3,8 @@
 use std::io::{self, Write};
 
 use antumbra::LocalOrigin;
+use rawzip::time::UtcDateTime;
+use rawzip::{ErrorKind, ZipArchiveWriter};
 
 use crate::BitMatrix;
 
@@ -27,13 +29,18 @@ pub enum Array<'a> {
     Text(&'a str),
 }
 
-/// Whether points are in world coordinates, without an offset.
-fn is_zero(local: &LocalOrigin) -> bool {
-    *local == LocalOrigin::default()
-}
-
 /// Numbers that are converted together.
 const PIECE: usize = 1 << 12;
+
+/// Writes numbers, some at a time; `add` adds the bytes of one.
+fn put<T>(numbers: &[T], file: &mut dyn Write, add: impl Fn(&T, &mut Vec<u8>)) -> io::Result<()> {
+    let mut bytes = Vec::new();
+    numbers.chunks(PIECE).try_for_each(|piece| {
+        bytes.clear();
+        piece.iter().for_each(|number| add(number, &mut bytes));
+        file.write_all(&bytes)
+    })
+}
 
 impl Array<'_> {
     fn len(&self) -> usize {
@@ -49,71 +56,44 @@ impl Array<'_> {
 
     /// Size of the values in the file in bytes, without the header.
     pub fn bytes(&self) -> u64 {
-        let of_one = match self {
-            Self::F64(_) | Self::Counts(_) => 8,
-            Self::F32(_) | Self::Points(_) => 4,
-            Self::Places(_, local) => {
-                if is_zero(local) {
-                    4
-                } else {
-                    8
-                }
+        (self.len() * self.kind().1) as u64
+    }
+
+    /// The type of the numbers as numpy names it, and bytes of one.
+    fn kind(&self) -> (String, usize) {
+        let (name, width) = match self {
+            Self::F64(_) => ("<f8", 8),
+            Self::Places(_, local) if *local != LocalOrigin::default() => ("<f8", 8),
+            Self::F32(_) | Self::Points(_) | Self::Places(..) => ("<f4", 4),
+            Self::Counts(_) => ("<i8", 8),
+            Self::Bits(_) => ("|u1", 1),
+            Self::Text(text) => {
+                let length = text.chars().count().max(1);
+                return (format!("<U{length}"), 4 * length);
             }
-            Self::Bits(_) => 1,
-            Self::Text(text) => 4 * text.chars().count().max(1),
         };
-        self.len() as u64 * of_one as u64
+        (name.to_owned(), width)
     }
 
-    fn kind(&self) -> String {
-        match self {
-            Self::F64(_) => "<f8".into(),
-            Self::Places(_, local) if !is_zero(local) => "<f8".into(),
-            Self::F32(_) | Self::Points(_) | Self::Places(..) => "<f4".into(),
-            Self::Counts(_) => "<i8".into(),
-            Self::Bits(_) => "|u1".into(),
-            Self::Text(text) => format!("<U{}", text.chars().count().max(1)),
-        }
-    }
-
-    /// Hands over the bytes, some at a time.
-    fn each(&self, put: &mut dyn FnMut(&[u8]) -> io::Result<()>) -> io::Result<()> {
-        let mut bytes = Vec::new();
-        let mut numbers = |piece: &mut dyn Iterator<Item = [u8; 8]>, width: usize| {
-            bytes.clear();
-            piece.for_each(|number| bytes.extend(&number[..width]));
-            put(&bytes)
-        };
-        let four = |bytes: [u8; 4]| [bytes[0], bytes[1], bytes[2], bytes[3], 0, 0, 0, 0];
-        match self {
-            Self::F64(values) => values
-                .chunks(PIECE)
-                .try_for_each(|piece| numbers(&mut piece.iter().map(|x| x.to_le_bytes()), 8)),
-            Self::F32(values) => values
-                .chunks(PIECE)
-                .try_for_each(|piece| numbers(&mut piece.iter().map(|x| four(x.to_le_bytes())), 4)),
-            Self::Places(points, local) if !is_zero(local) => {
-                points.chunks(PIECE).try_for_each(|piece| {
-                    let world = piece.iter().flat_map(|point| local.world(*point));
-                    numbers(&mut world.map(f64::to_le_bytes), 8)
+    fn write(&self, file: &mut dyn Write) -> io::Result<()> {
+        match *self {
+            Self::F64(values) => put(values, file, |x, to| to.extend(x.to_le_bytes())),
+            Self::F32(values) => put(values, file, |x, to| to.extend(x.to_le_bytes())),
+            Self::Places(points, local) if local != LocalOrigin::default() => {
+                put(points, file, |&point, to| {
+                    to.extend(local.world(point).map(f64::to_le_bytes).as_flattened());
                 })
             }
-            Self::Points(points) | Self::Places(points, _) => points
-                .as_flattened()
-                .chunks(PIECE)
-                .try_for_each(|piece| numbers(&mut piece.iter().map(|x| four(x.to_le_bytes())), 4)),
-            Self::Counts(values) => values
-                .chunks(PIECE)
-                .try_for_each(|piece| numbers(&mut piece.iter().map(|x| x.to_le_bytes()), 8)),
-            Self::Bits(matrix) => matrix
-                .words()
-                .chunks(PIECE)
-                .try_for_each(|piece| numbers(&mut piece.iter().map(|x| x.to_le_bytes()), 8)),
-            Self::Text("") => numbers(&mut [[0; 8]].into_iter(), 4),
-            Self::Text(text) => numbers(
-                &mut text.chars().map(|c| four(u32::from(c).to_le_bytes())),
-                4,
-            ),
+            Self::Points(points) | Self::Places(points, _) => {
+                Array::F32(points.as_flattened()).write(file)
+            }
+            Self::Counts(values) => put(values, file, |x, to| to.extend(x.to_le_bytes())),
+            Self::Bits(matrix) => Array::Counts(matrix.words()).write(file),
+            Self::Text("") => file.write_all(&[0; 4]),
+            Self::Text(text) => {
+                let mut characters = text.chars();
+                characters.try_for_each(|c| file.write_all(&u32::from(c).to_le_bytes()))
+            }
         }
     }
 
@@ -122,7 +102,7 @@ impl Array<'_> {
         let shape: String = shape.iter().map(|n| format!("{n}, ")).collect();
         let mut text = format!(
             "{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}",
-            self.kind(),
+            self.kind().0,
             shape.trim_end()
         );
         // Data begin at a multiple of 64 bytes.
@@ -170,173 +150,46 @@ pub fn npz_bytes(entries: &[Entry<'_>]) -> u64 {
     entries.iter().map(|entry| entry.array.bytes() + 400).sum()
 }
 
-/// Writes arrays as an .npz file. Equal arrays make equal bytes: no time is written.
+/// 1980-01-01, the first date that archives can have.
+const DATE: i64 = 315_532_800;
+
+/// The error of the writer as it is, so that its kind and its words are kept.
+fn plain(error: rawzip::Error) -> io::Error {
+    match error.into_kind() {
+        ErrorKind::IO(error) => error,
+        kind => io::Error::other(format!("{kind}")),
+    }
+}
+
+/// Writes arrays as an .npz file. Equal arrays make equal bytes, because all have the same date.
 ///
 /// # Errors
-/// [`io::ErrorKind::InvalidInput`] if a shape does not have as many numbers as its array, or if a name is longer than 100
-/// bytes. Otherwise errors of the writer.
+/// [`io::ErrorKind::InvalidInput`] if a shape does not have as many numbers as its array. Otherwise errors of the writer.
 pub fn write_npz(entries: &[Entry<'_>], file: &mut dyn Write) -> io::Result<()> {
-    let invalid = |reason: &'static str| io::Error::new(io::ErrorKind::InvalidInput, reason);
-    let mut offset = 0;
-    let mut directory = Vec::new();
-    for entry in entries {
-        let name = format!("{}.npy", entry.name);
-        let numbers: usize = entry.shape.iter().product();
-        if numbers != entry.array.len() {
-            return Err(invalid("a shape that does not fit its array"));
+    let mut archive = ZipArchiveWriter::new(file);
+    for Entry { name, shape, array } in entries {
+        if shape.iter().product::<usize>() != array.len() {
+            let reason = "a shape that does not fit its array";
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, reason));
         }
-        if name.len() > 104 {
-            return Err(invalid("a name that is too long"));
-        }
-        let header = entry.array.header(&entry.shape);
-        let size = header.len() as u64 + entry.array.bytes();
-        let mut sum = Crc::new();
-        sum.add(&header);
-        entry.array.each(&mut |bytes| {
-            sum.add(bytes);
-            Ok(())
-        })?;
-        let record = Record {
-            name,
-            crc: sum.value(),
-            size,
-            offset,
-        };
-        let local = record.local();
-        file.write_all(&local)?;
-        file.write_all(&header)?;
-        entry.array.each(&mut |bytes| file.write_all(bytes))?;
-        offset += local.len() as u64 + size;
-        directory.extend(record.central());
+        let member = archive.new_file(format!("{name}.npy"));
+        let member = member.last_modified(UtcDateTime::from_unix(DATE));
+        let (mut member, config) = member.start().map_err(plain)?;
+        let mut data = config.wrap(&mut member);
+        data.write_all(&array.header(shape))?;
+        array.write(&mut data)?;
+        let (_, sums) = data.finish().map_err(plain)?;
+        member.finish(sums).map_err(plain)?;
     }
-    file.write_all(&directory)?;
-    file.write_all(&end(entries.len() as u64, directory.len() as u64, offset))
-}
-
-/// A file of the archive. Sizes and offsets are always in the extra field of large archives (zip64).
-struct Record {
-    name: String,
-    crc: u32,
-    size: u64,
-    offset: u64,
-}
-
-/// Mark of a number whose 64 bits are in another field.
-const ELSEWHERE: u32 = u32::MAX;
-/// Version of the format that has numbers of 64 bits: 4.5.
-const VERSION: u16 = 45;
-/// 1980-01-01, the first date there is.
-const DATE: u16 = (1 << 5) | 1;
-
-impl Record {
-    fn shared(&self, bytes: &mut Vec<u8>, extra: u16) {
-        // Flags, method (stored) and time.
-        for number in [VERSION, 0, 0, 0, DATE] {
-            bytes.extend(number.to_le_bytes());
-        }
-        for number in [self.crc, ELSEWHERE, ELSEWHERE] {
-            bytes.extend(number.to_le_bytes());
-        }
-        bytes.extend((self.name.len() as u16).to_le_bytes());
-        bytes.extend(extra.to_le_bytes());
-    }
-
-    fn local(&self) -> Vec<u8> {
-        let mut bytes = b"PK\x03\x04".to_vec();
-        self.shared(&mut bytes, 20);
-        bytes.extend(self.name.bytes());
-        bytes.extend([1, 0, 16, 0]);
-        bytes.extend([self.size, self.size].map(u64::to_le_bytes).as_flattened());
-        bytes
-    }
-
-    fn central(&self) -> Vec<u8> {
-        let mut bytes = b"PK\x01\x02".to_vec();
-        bytes.extend(VERSION.to_le_bytes());
-        self.shared(&mut bytes, 28);
-        // Comment, disk and attributes.
-        bytes.extend([0; 10]);
-        bytes.extend(ELSEWHERE.to_le_bytes());
-        bytes.extend(self.name.bytes());
-        bytes.extend([1, 0, 24, 0]);
-        let numbers = [self.size, self.size, self.offset];
-        bytes.extend(numbers.map(u64::to_le_bytes).as_flattened());
-        bytes
-    }
-}
-
-/// End of an archive, in its long form and its short one.
-fn end(files: u64, size: u64, offset: u64) -> Vec<u8> {
-    let mut bytes = b"PK\x06\x06".to_vec();
-    bytes.extend(44_u64.to_le_bytes());
-    bytes.extend([VERSION, VERSION].map(u16::to_le_bytes).as_flattened());
-    bytes.extend([0; 8]);
-    let numbers = [files, files, size, offset];
-    bytes.extend(numbers.map(u64::to_le_bytes).as_flattened());
-    bytes.extend(b"PK\x06\x07\x00\x00\x00\x00");
-    bytes.extend((offset + size).to_le_bytes());
-    bytes.extend(1_u32.to_le_bytes());
-    bytes.extend(b"PK\x05\x06\x00\x00\x00\x00");
-    bytes.extend([u16::MAX; 2].map(u16::to_le_bytes).as_flattened());
-    bytes.extend([ELSEWHERE; 2].map(u32::to_le_bytes).as_flattened());
-    bytes.extend([0; 2]);
-    bytes
-}
-
-/// Check sum of .zip files: CRC-32, four bytes at a time.
-struct Crc {
-    tables: [[u32; 256]; 4],
-    state: u32,
-}
-
-impl Crc {
-    fn new() -> Self {
-        let mut tables = [[0; 256]; 4];
-        for index in 0..256 {
-            tables[0][index] = (0..8).fold(index as u32, |value, _| {
-                (value >> 1) ^ if value & 1 == 1 { 0xEDB8_8320 } else { 0 }
-            });
-        }
-        for table in 1..4 {
-            for index in 0..256 {
-                let before = tables[table - 1][index];
-                tables[table][index] = (before >> 8) ^ tables[0][(before & 0xFF) as usize];
-            }
-        }
-        Self { tables, state: !0 }
-    }
-
-    fn add(&mut self, bytes: &[u8]) {
-        let (fours, rest) = bytes.as_chunks::<4>();
-        for four in fours {
-            let value = self.state ^ u32::from_le_bytes(*four);
-            let look =
-                |table: usize, byte: u32| self.tables[table][(value >> byte & 0xFF) as usize];
-            self.state = look(3, 0) ^ look(2, 8) ^ look(1, 16) ^ look(0, 24);
-        }
-        for &byte in rest {
-            let index = (self.state ^ u32::from(byte)) & 0xFF;
-            self.state = (self.state >> 8) ^ self.tables[0][index as usize];
-        }
-    }
-
-    fn value(&self) -> u32 {
-        !self.state
-    }
+    archive.finish().map_err(plain)?;
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use rawzip::ZipArchive;
 
-    #[test]
-    fn check_sums_are_the_published_ones() {
-        for (text, value) in [("", 0), ("123456789", 0xCBF4_3926), ("a", 0xE8B7_BE43)] {
-            let mut sum = Crc::new();
-            sum.add(text.as_bytes());
-            assert_eq!(sum.value(), value, "{text}");
-        }
-    }
+    use super::*;
 
     #[test]
     fn headers_are_what_numpy_writes() {
@@ -352,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_lie_where_the_directory_says() {
+    fn archives_have_the_arrays() {
         let matrix = BitMatrix::from_words(2, 70, vec![1, 2, 3, 4]).expect("a matrix");
         let entries = [
             Entry::new("seen", Array::Bits(&matrix)),
@@ -362,21 +215,27 @@ mod tests {
         let mut file = Vec::new();
         write_npz(&entries, &mut file).expect("written");
         assert!(file.len() as u64 <= npz_bytes(&entries) + 400);
-        let find = |word: &[u8]| {
-            let mut windows = file.windows(word.len());
-            windows.position(|window| window == word).expect("a place")
-        };
-        let start = find(b"hours.npy");
-        let data = &file[start + 9 + 20..];
-        assert!(data.starts_with(b"\x93NUMPY"));
-        assert_eq!(data[64..72].len(), 8);
-        let header = 10 + usize::from(u16::from_le_bytes([data[8], data[9]]));
-        assert_eq!(data[header..header + 8], 1.5_f64.to_le_bytes());
-        let central = find(b"PK\x01\x02");
-        let long_end = find(b"PK\x06\x06");
+        let mut again = Vec::new();
+        write_npz(&entries, &mut again).expect("written");
+        assert!(again == file, "equal arrays make equal bytes");
+        let archive = ZipArchive::from_slice(&file).expect("an archive");
+        let mut found = Vec::new();
+        for record in archive.entries() {
+            let record = record.expect("a record");
+            let member = archive.get_entry(record.wayfinder()).expect("a member");
+            let (name, data) = (record.file_path(), member.data());
+            assert!(data.starts_with(b"\x93NUMPY"));
+            let length = 10 + usize::from(u16::from_le_bytes([data[8], data[9]]));
+            assert_eq!(length % 64, 0);
+            assert_eq!(record.crc32(), rawzip::crc32(data));
+            found.push((name.as_ref().to_vec(), data[length..].to_vec()));
+        }
+        let names: Vec<&[u8]> = found.iter().map(|(name, _)| &name[..]).collect();
+        assert_eq!(names, [&b"seen.npy"[..], b"hours.npy", b"points.npy"]);
+        assert_eq!(found[1].1, [1.5_f64, 2.5].map(f64::to_le_bytes).concat());
         assert_eq!(
-            file[long_end + 48..long_end + 56],
-            (central as u64).to_le_bytes()
+            found[2].1,
+            [1.0_f32, 2.0, 3.0].map(f32::to_le_bytes).concat()
         );
         let bad = Entry::new("x", Array::F64(&[1.0; 3])).columns(2);
         assert!(write_npz(&[bad], &mut Vec::new()).is_err());
