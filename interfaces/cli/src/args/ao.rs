@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use antumbra_bake::AmbientOcclusion;
-use clap::Args;
+use clap::{ArgAction, Args};
 
 use super::values::Resolution;
 use super::{ChunkArgs, MachineArgs, PoseArgs, SCENE, SCENE_LONG, heading, values};
@@ -21,8 +21,8 @@ pub struct AoArgs {
     /// as the float property ao, and as a grey colour of 8 bits; in a .glb, as COLOR_0. A .png or .exr is a picture from the
     /// camera, which frames a mesh without a camera, or with --atlas a texture. A .tif (GeoTIFF), .asc or .npy has the values in
     /// the cells of a scene that is a raster. A shard is a .part.
-    #[arg(short, long, value_name = "FILE|-", value_parser = values::output_file(), help_heading = heading::OUTPUT)]
-    pub output: PathBuf,
+    #[arg(short, long, value_name = "FILE|-", required = true, num_args = 1, action = ArgAction::Set, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
+    pub output: Vec<PathBuf>,
     /// Texture of N x N texels by texture coordinates
     ///
     /// All meshes share one texture, for coordinates from 0 to 1.

@@ -35,15 +35,9 @@ pub enum FarmJob {
 
 impl FarmJob {
     /// Name of the command.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Render => "render",
-            Self::Ao => "ao",
-            Self::Sun => "sun",
-            Self::Visible => "visible",
-            Self::Horizon => "horizon",
-            Self::Factors => "factors",
-        }
+    pub fn name(self) -> String {
+        let value = self.to_possible_value();
+        value.map_or_else(String::new, |value| value.get_name().to_owned())
     }
 }
 

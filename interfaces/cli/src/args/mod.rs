@@ -2,12 +2,14 @@
 //!
 //! - `render`, `view`, `merge`, `farm`, `study`, `bench`, `ao`, `sun`, `visible`, `horizon`, `factors`, `info`, `image`, `list`, `man`: the flags of one
 //!   command each
+//! - `bakes`: the commands that bake, in one list
 //! - `camera`: flags about camera, film and light
 //! - `picture`, `tree`, `display`, `machine`, `map`, `chunks`: flags that several commands have
 //! - `slips`: better words about mistakes
 //! - `values`: what flags may be set to;  `names`: names of orders, builders and so on, from the kernel's lists
 
 mod ao;
+mod bakes;
 mod bench;
 mod camera;
 mod chunks;
@@ -43,6 +45,8 @@ use antumbra_load::MemorySize;
 use crate::version;
 
 pub use ao::AoArgs;
+pub use bakes::BakeCommand;
+pub(crate) use bakes::of_bake;
 pub use bench::BenchArgs;
 pub use camera::{CameraArgs, PoseArgs};
 pub use chunks::ChunkArgs;
@@ -199,40 +203,8 @@ pub enum Command {
     /// Spheres are traced as meshes, instances as instances. Alpha masks are looked up wherever a mesh with one is hit,
     /// by Embree through its filter functions. Close other programs first.
     Bench(BenchArgs),
-    /// Bake ambient occlusion: of vertices, a texture or a picture
-    ///
-    /// The value is the open part of the sky above a point: 1 where nothing is in the way, 0 where all is closed. Normals come
-    /// from the file. Without them, they are means of the triangles around a vertex, weighted by area, and vertices are
-    /// split where triangles meet at more than 40 degrees. So a corner of a roof has the open sky of the roof, and its copies
-    /// have what the walls see. The file has the same bytes for any number of threads and shards.
-    Ao(AoArgs),
-    /// Bake hours of direct sun, sky view factors and irradiation
-    ///
-    /// Each sensor traces a ray to every sun and every patch of the sky. Example, for a year in hours:
-    ///
-    /// antumbra sun city.ply --grid 2 --lat 48.2 --lon 16.4 --timezone 1 -o hours.csv -o hours.png
-    ///
-    /// Suns are where the algorithm of NREL has them. Light that surfaces reflect is left out.
-    #[command(override_usage = "antumbra sun [OPTIONS] -o <OUT> <SENSORS> <SCENE>")]
-    Sun(Box<SunArgs>),
-    /// Find which points see each other, and what observers see
-    ///
-    /// Points see each other if nothing lies between them. With --viewshed, the result is how many points of
-    /// A.csv see each place of the mesh.
-    Visible(VisibleArgs),
-    /// Find how high the horizon is in each direction
-    ///
-    /// The angle is the elevation in degrees from which on up to the zenith all of the sky is seen: 0 on an open plain, 90 below a
-    /// roof. Directions behind the surface of a sensor count as closed. Cells of a height raster (--cells) are computed exactly, from
-    /// its triangles in double precision. Otherwise rays find the angle to less than 0.001 degrees, and may miss surfaces that float
-    /// above others and are less than half a degree high.
-    #[command(override_usage = "antumbra horizon [OPTIONS] -o <OUT> <SENSORS> <SCENE>")]
-    Horizon(HorizonArgs),
-    /// Find how much of the light of a surface arrives at others
-    ///
-    /// View factors: the part of the light that leaves a surface evenly and arrives at each other one, or nowhere. Rows add up to
-    /// 1. Triangles emit on the side from which their corners run anticlockwise; both sides receive.
-    Factors(FactorArgs),
+    #[command(flatten)]
+    Bake(BakeCommand),
     /// Describe a scene and its trees
     Info(InfoArgs),
     /// Compare, convert and draw images

@@ -1,7 +1,6 @@
 //! `antumbra ao`: ambient occlusion of vertices, texels or pixels.
 
 use std::path::Path;
-use std::slice;
 
 use antumbra::{Bvh, Isa, Recipe};
 use antumbra_bake::{
@@ -10,55 +9,21 @@ use antumbra_bake::{
 };
 use antumbra_image::{Image, Rgb8Image, Window, atomic_write};
 use antumbra_lab::{count, thread_seconds};
-use antumbra_load::{MemorySize, set_resolution};
+use antumbra_load::set_resolution;
 use antumbra_raster::Quantity;
-use serde::Serialize;
 
-use super::chunks::{self, PartFile};
-use super::command::{Bake, Head, text};
+use super::command::{Bake, Baking, Done, Figure, text};
 use super::files::{self, Format};
 use super::ground::Ground;
 use super::raster;
 use super::view::View;
 use crate::args::AoArgs;
 use crate::exit::{Failure, tell};
-use crate::{interrupt, json, output, scenes};
+use crate::output::{self, Files};
+use crate::{interrupt, scenes};
 
 /// Name of the value in files.
 const PROPERTY: &str = "ao";
-
-/// The JSON document.
-#[derive(Serialize)]
-struct Document<'a> {
-    #[serde(flatten)]
-    head: Head<'a>,
-    output: String,
-    shard: Option<String>,
-    /// `vertices`, `texels` or `pixels`.
-    of: &'static str,
-    samples: u32,
-    /// `null` for any distance.
-    distance: Option<f32>,
-    two_sided: bool,
-    bent_normals: bool,
-    weighting: &'static str,
-    seed: u64,
-    vertices: usize,
-    triangles: usize,
-    /// Points that have rays: vertices, texels with a triangle, or points of pixels.
-    points: usize,
-    /// Points without a value: those without a normal, or with coordinates that are not finite.
-    without_value: usize,
-    rays: u64,
-    /// `null` if no point has a value.
-    mean: Option<f64>,
-    min: Option<f32>,
-    max: Option<f32>,
-    load_seconds: f64,
-    build_seconds: f64,
-    learned: Option<Learned>,
-    bake_seconds: f64,
-}
 
 /// Points whose values are computed.
 enum Target {
@@ -68,30 +33,12 @@ enum Target {
     Pixels(View),
 }
 
-/// Refuses outputs that cannot be made, before anything is read.
-pub fn check(args: &AoArgs) -> Result<Format, Failure> {
+/// Format of the output, if it can be made.
+fn format(args: &AoArgs) -> Result<Format, Failure> {
     let pose = args.pose.given();
     if let (Some(_), Some(flag)) = (args.atlas, pose) {
         return Err(Failure::Usage(format!(
             "{flag} does not go with --atlas: a texture has no camera"
-        )));
-    }
-    if args.chunks.shard.is_some() {
-        let is_picture = args.atlas.is_some() || args.resolution.is_some() || pose.is_some();
-        return Ok(match is_picture {
-            true => Format::Picture,
-            false => Format::Ply,
-        });
-    }
-    let known = [
-        "ply", "glb", "npz", "png", "exr", "tif", "tiff", "asc", "npy",
-    ];
-    let sentence = "meshes are written as ply, glb or npz, pictures and textures as png or exr, rasters as tif, asc or npy";
-    let format = Format::of(&args.output, &known, sentence)?;
-    if format == Format::Raster && (!raster::is_raster(&args.scene) || args.bent_normals) {
-        return Err(Failure::Usage(format!(
-            "{}: a raster needs a scene that is one, and holds no --bent-normals",
-            args.output.display()
         )));
     }
     let flag = match (args.atlas, args.resolution) {
@@ -99,82 +46,138 @@ pub fn check(args: &AoArgs) -> Result<Format, Failure> {
         (None, Some(_)) => Some("--resolution"),
         (None, None) => pose,
     };
-    match flag {
-        Some(flag) if format != Format::Picture => Err(Failure::Usage(format!(
-            "{flag} makes a png or exr, not {}",
-            args.output.display()
-        ))),
-        _ => Ok(format),
+    if args.chunks.shard.is_some() {
+        return Ok(flag.map_or(Format::Ply, |_| Format::Picture));
+    }
+    let (path, name) = (&args.output[0], args.output[0].display());
+    let known = [
+        "ply", "glb", "npz", "png", "exr", "tif", "tiff", "asc", "npy",
+    ];
+    let sentence = "meshes are written as ply, glb or npz, pictures and textures as png or exr, rasters as tif, asc or npy";
+    let format = Format::of(path, &known, sentence)?;
+    let reason = match (format, flag) {
+        (Format::Raster, _) if !raster::is_raster(&args.scene) || args.bent_normals => {
+            format!("{name}: a raster needs a scene that is one, and holds no --bent-normals")
+        }
+        (Format::Picture, _) | (_, None) => return Ok(format),
+        (_, Some(flag)) => format!("{flag} makes a png or exr, not {name}"),
+    };
+    Err(Failure::Usage(reason))
+}
+
+impl Baking for AoArgs {
+    fn check(&self) -> Result<(), Failure> {
+        format(self).map(drop)
+    }
+
+    fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
+        let (format, output) = (format(self)?, &self.output[0]);
+        let mut ground = bake.ground(&mut files, None)?;
+        if let Some(resolution) = self.resolution {
+            set_resolution(&mut ground.loaded.scene, resolution.0)?;
+        }
+        scenes::apply_pose(&mut ground.loaded, &self.pose)?;
+        scenes::tell_read(&ground.loaded, self.pose.up);
+        ground.split_at_creases()?;
+        let target = match (format, self.atlas) {
+            (Format::Picture, Some(size)) => Target::Texels(atlas(&ground, size)?),
+            (Format::Picture, None) => Target::Pixels(View::new(&ground)?),
+            _ => {
+                let offset = |point: [f32; 3]| ground.bvh.origin_offset(point);
+                Target::Vertices(inside_edges(&ground.mesh, offset))
+            }
+        };
+        let job = job(self, &ground, &target)?;
+        let learned = match bake.parts {
+            None => learn_when_it_pays(&job, &ground.bvh, learn(&ground, bake.isa), thread_seconds),
+            Some(_) => None,
+        };
+        let own = learned.as_ref().and_then(|(bvh, _)| bvh.as_ref());
+        let learned = learned.as_ref().map(|(_, learned)| *learned);
+        let done = bake.compute(&job, &ground, own.unwrap_or(&ground.bvh))?;
+        if let Some(found) = &done.found {
+            let _writing = interrupt::writing();
+            match &target {
+                Target::Vertices(_) => write_mesh(output, format, &ground, found)?,
+                Target::Texels(atlas) => write_atlas(self, atlas, found)?,
+                Target::Pixels(view) => {
+                    let picture = view.picture(&found.open, &found.bent_normals)?;
+                    picture.write(output)?;
+                }
+            }
+        }
+        report(self, bake, (&ground, &target), &job, learned, &done)
     }
 }
 
-/// Runs the command, or merges parts of it.
-pub fn run(args: &AoArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Result<(), Failure> {
-    let isa = args.machine.isa()?;
-    let format = check(args)?;
-    let bake = Bake {
-        scene: &args.scene,
-        outputs: slice::from_ref(&args.output),
-        json: args.json.as_ref(),
-        chunks: &args.chunks,
-        machine: &args.machine,
-        parts,
-        earth: None,
-    };
-    let mut files = bake.declare(&[], &[])?;
-    let mut ground = bake.ground(isa, memory, &mut files)?;
-    if let Some(resolution) = args.resolution {
-        set_resolution(&mut ground.loaded.scene, resolution.0)?;
-    }
-    scenes::apply_pose(&mut ground.loaded, &args.pose)?;
-    scenes::tell_read(&ground.loaded, args.pose.up);
-    ground.split_at_creases()?;
-    let target = match (format, args.atlas) {
-        (Format::Picture, Some(size)) => Target::Texels(atlas(&ground, size)?),
-        (Format::Picture, None) => Target::Pixels(View::new(&ground)?),
-        _ => {
-            let offset = |point: [f32; 3]| ground.bvh.origin_offset(point);
-            Target::Vertices(inside_edges(&ground.mesh, offset))
-        }
-    };
-    let job = job(args, &ground, &target)?;
-    let learned = match parts {
-        None => learn_when_it_pays(&job, &ground.bvh, learn(&ground, isa), thread_seconds),
-        Some(_) => None,
-    };
-    let own = learned.as_ref().and_then(|(bvh, _)| bvh.as_ref());
-    let done = bake.compute(&job, &ground, own.unwrap_or(&ground.bvh))?;
-    let mut document = Document {
-        learned: learned.as_ref().map(|(_, learned)| *learned),
-        bake_seconds: done.seconds,
-        ..Document::new(
-            args,
-            &bake,
-            bake.head("antumbra.ao/1", isa, &ground.loaded.scene.name),
-            &ground,
-        )
-    };
-    document.of = target.name();
-    document.points = job.items();
-    let Some(found) = done.found else {
-        json::write(&document, args.json.as_ref())?;
-        tell(format_args!("wrote {}, for merge", document.output));
+/// Writes the document, and says what was done.
+fn report(
+    args: &AoArgs,
+    bake: &Bake<'_>,
+    (ground, target): (&Ground, &Target),
+    job: &OcclusionJob,
+    learned: Option<Learned>,
+    done: &Done<Openness>,
+) -> Result<(), Failure> {
+    let values = done.found.as_ref().map_or(&[][..], |found| &found.open);
+    let known = || values.iter().copied().filter(|value| !value.is_nan());
+    let with_value = known().count();
+    let without_value = values.len() - with_value;
+    let rays = job.rays_per_item() * with_value as u64;
+    let sum: f64 = known().map(f64::from).sum();
+    let mean = (with_value > 0).then(|| sum / with_value as f64);
+    let (min, max) = (known().reduce(f32::min), known().reduce(f32::max));
+    let vertices = ground.mesh.positions.len();
+    let figures: &[Figure<'_>] = &[
+        ("output", &text(&args.output[0])),
+        ("shard", &bake.shard()),
+        ("of", &target.name()),
+        ("samples", &args.samples),
+        (
+            "distance",
+            &args.distance.filter(|distance| distance.is_finite()),
+        ),
+        ("two_sided", &args.two_sided),
+        ("bent_normals", &args.bent_normals),
+        (
+            "weighting",
+            &if args.uniform { "uniform" } else { "cosine" },
+        ),
+        ("seed", &args.seed),
+        ("vertices", &vertices),
+        ("triangles", &ground.mesh.indices.len()),
+        ("points", &job.items()),
+        ("without_value", &without_value),
+        ("rays", &rays),
+        ("mean", &mean),
+        ("min", &min),
+        ("max", &max),
+        ("load_seconds", &ground.loaded.seconds),
+        ("build_seconds", &ground.build_seconds),
+        ("learned", &learned),
+        ("bake_seconds", &done.seconds),
+    ];
+    let name = ("antumbra.ao/1", &*ground.loaded.scene.name);
+    if !bake.document(name, figures, (done, ""))? {
         return Ok(());
-    };
-    document.fill(&found.open, &job);
-    let _writing = interrupt::writing();
-    match &target {
-        Target::Vertices(_) => write_mesh(&args.output, format, &ground, &found)?,
-        Target::Texels(atlas) => write_atlas(args, atlas, &found)?,
-        Target::Pixels(view) => {
-            let picture = view.picture(&found.open, &found.bent_normals)?;
-            picture.write(&args.output)?;
-        }
     }
-    json::write(&document, args.json.as_ref())?;
-    document.tell(&ground);
-    bake.tell_done("rays", document.rays, document.bake_seconds);
-    chunks::forget(done.checkpoint.as_deref());
+    ground.tell(&format!("{} vertices, ", count(vertices as u64)));
+    if let Some(learned) = &learned {
+        tell(format_args!("{learned}"));
+    }
+    if without_value > 0 {
+        tell(format_args!(
+            "{} {} without a normal have the value NaN",
+            count(without_value as u64),
+            target.name(),
+        ));
+    }
+    if let (Some(mean), Some(min), Some(max)) = (mean, min, max) {
+        tell(format_args!(
+            "ambient occlusion {mean:.3} on average, {min:.3} to {max:.3}"
+        ));
+    }
+    bake.end("rays", rays, done);
     Ok(())
 }
 
@@ -291,7 +294,7 @@ fn write_mesh(
 }
 
 fn write_atlas(args: &AoArgs, atlas: &Atlas, found: &Openness) -> Result<(), Failure> {
-    let extension = args.output.extension().unwrap_or_default();
+    let extension = args.output[0].extension().unwrap_or_default();
     let is_exr = extension.eq_ignore_ascii_case("exr");
     let pixel = |index: usize| match found.bent_normals.get(index) {
         None => [found.open[index]; 3],
@@ -302,71 +305,10 @@ fn write_atlas(args: &AoArgs, atlas: &Atlas, found: &Openness) -> Result<(), Fai
     let size = atlas.size as usize;
     if is_exr {
         let image = Image::new(size, size, Window::full(size, size), pixels)?;
-        return Ok(image.write(&args.output)?);
+        return Ok(image.write(&args.output[0])?);
     }
     // Textures of occlusion are linear, so that no display curve is applied. NaN becomes 0.
     let byte = |x: f32| (x * 255.0).round() as u8;
     let pixels = pixels.into_iter().map(|pixel| pixel.map(byte)).collect();
-    Ok(Rgb8Image::new(size, size, pixels)?.write(&args.output)?)
-}
-
-impl<'a> Document<'a> {
-    /// A document of what is known before anything is computed.
-    fn new(args: &AoArgs, bake: &Bake<'_>, head: Head<'a>, ground: &Ground) -> Self {
-        Self {
-            head,
-            output: text(&args.output),
-            shard: bake.shard(),
-            of: "",
-            samples: args.samples,
-            distance: args.distance.filter(|distance| distance.is_finite()),
-            two_sided: args.two_sided,
-            bent_normals: args.bent_normals,
-            weighting: if args.uniform { "uniform" } else { "cosine" },
-            seed: args.seed,
-            vertices: ground.mesh.positions.len(),
-            triangles: ground.mesh.indices.len(),
-            points: 0,
-            without_value: 0,
-            rays: 0,
-            mean: None,
-            min: None,
-            max: None,
-            load_seconds: ground.loaded.seconds,
-            build_seconds: ground.build_seconds,
-            learned: None,
-            bake_seconds: 0.0,
-        }
-    }
-
-    /// Fills in figures about the values.
-    fn fill(&mut self, values: &[f32], job: &OcclusionJob) {
-        let known = || values.iter().copied().filter(|value| !value.is_nan());
-        let with_value = known().count();
-        self.without_value = values.len() - with_value;
-        self.rays = job.rays_per_item() * with_value as u64;
-        let sum: f64 = known().map(f64::from).sum();
-        self.mean = (with_value > 0).then(|| sum / with_value as f64);
-        self.min = known().reduce(f32::min);
-        self.max = known().reduce(f32::max);
-    }
-
-    fn tell(&self, ground: &Ground) {
-        ground.tell(&format!("{} vertices, ", count(self.vertices as u64)));
-        if let Some(learned) = &self.learned {
-            tell(format_args!("{learned}"));
-        }
-        if self.without_value > 0 {
-            tell(format_args!(
-                "{} {} without a normal have the value NaN",
-                count(self.without_value as u64),
-                self.of,
-            ));
-        }
-        if let (Some(mean), Some(min), Some(max)) = (self.mean, self.min, self.max) {
-            tell(format_args!(
-                "ambient occlusion {mean:.3} on average, {min:.3} to {max:.3}"
-            ));
-        }
-    }
+    Ok(Rgb8Image::new(size, size, pixels)?.write(&args.output[0])?)
 }

@@ -3,41 +3,80 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use antumbra::{Bvh, Isa};
+use antumbra::{Bvh, Isa, Recipe};
 use antumbra_bake::{Error, Job, Key, Work};
 use antumbra_lab::{Machine, count};
 use antumbra_load::MemorySize;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::chunks::{self, PartFile};
 use super::ground::{Earth, Ground};
-use crate::args::{ChunkArgs, MachineArgs};
+use super::map;
+use super::terrain::Terrain;
+use crate::args::{BakeCommand, ChunkArgs, MachineArgs, of_bake};
 use crate::exit::{Failure, tell};
 use crate::json::Destination;
 use crate::output::Files;
 use crate::progress::Progress;
-use crate::{input, scenes, version};
+use crate::{input, json, scenes, version};
+
+/// What a command has of its own.
+pub trait Baking {
+    /// Refuses outputs that cannot be made, before anything is read.
+    fn check(&self) -> Result<(), Failure>;
+
+    /// Computes and writes everything. `files` are to note what is read and written beside the arguments of all bakes.
+    fn bake(&self, bake: &Bake<'_>, files: Files) -> Result<(), Failure>;
+
+    /// Files that are written beside `--output` and `--json`, and files that are read beside the scene.
+    fn files(&self) -> [Vec<Named<'_>>; 2] {
+        Default::default()
+    }
+}
+
+/// Runs a command, or merges parts of it.
+pub fn run(
+    command: &BakeCommand,
+    memory: MemorySize,
+    parts: Option<&[PartFile]>,
+) -> Result<(), Failure> {
+    of_bake!(command, args => {
+        let isa = args.machine.isa()?;
+        let is_ao = matches!(command, BakeCommand::Ao(_));
+        // What a share of ambient occlusion is of depends on its flags.
+        if args.chunks.shard.is_none() || is_ao {
+            args.check()?;
+        }
+        let bake = Bake {
+            scene: &args.scene,
+            outputs: &args.output,
+            json: args.json.as_ref(),
+            chunks: &args.chunks,
+            machine: &args.machine,
+            isa,
+            memory,
+            parts,
+        };
+        // Pictures of ambient occlusion are no maps.
+        let maps = if is_ao { &[] } else { bake.outputs };
+        let world_files = map::world_files(maps)?;
+        let [mut written, read] = args.files();
+        written.extend(world_files.iter().map(|path| ("the world file", Some(&**path))));
+        args.bake(&bake, bake.declare([written, read])?)
+    })
+}
 
 /// Arguments that all bakes have.
 pub struct Bake<'a> {
-    pub scene: &'a Path,
+    scene: &'a Path,
     pub outputs: &'a [PathBuf],
-    pub json: Option<&'a Destination>,
-    pub chunks: &'a ChunkArgs,
-    pub machine: &'a MachineArgs,
+    json: Option<&'a Destination>,
+    chunks: &'a ChunkArgs,
+    machine: &'a MachineArgs,
+    pub isa: Isa,
+    memory: MemorySize,
     /// Shares to take instead of computing anything.
     pub parts: Option<&'a [PartFile]>,
-    /// Curvature of the earth that was applied to the scene.
-    pub earth: Option<Earth<'a>>,
-}
-
-/// Beginning of a JSON document.
-#[derive(Serialize)]
-pub struct Head<'a> {
-    schema: &'static str,
-    #[serde(flatten)]
-    machine: Machine,
-    pub scene: &'a str,
 }
 
 /// A job that was computed.
@@ -46,15 +85,38 @@ pub struct Done<T> {
     pub found: Option<T>,
     pub seconds: f64,
     /// File of its chunks, which is needed until all outputs are written.
-    pub checkpoint: Option<PathBuf>,
+    checkpoint: Option<PathBuf>,
 }
 
 /// A flag, or another name of a file's purpose, and the file if it is given.
 pub type Named<'a> = (&'a str, Option<&'a Path>);
 
+/// A name and a value of a document.
+pub type Figure<'a> = (&'a str, &'a dyn erased_serde::Serialize);
+
+/// Figures as they are written.
+struct Figures<'a>(&'a [Figure<'a>]);
+
+impl Serialize for Figures<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().copied())
+    }
+}
+
+/// A JSON document.
+#[derive(Serialize)]
+struct Document<'a> {
+    schema: &'a str,
+    #[serde(flatten)]
+    machine: Machine,
+    scene: &'a str,
+    #[serde(flatten)]
+    figures: Figures<'a>,
+}
+
 impl Bake<'_> {
     /// Notes all files, with the files of these flags, and checks that outputs can be written.
-    pub fn declare(&self, written: &[Named<'_>], read: &[Named<'_>]) -> Result<Files, Failure> {
+    fn declare(&self, [written, read]: [Vec<Named<'_>>; 2]) -> Result<Files, Failure> {
         let is_shared = self.chunks.shard.is_some() || self.parts.is_some();
         if is_shared && self.scene == Path::new(scenes::STDIN) {
             let reason = "merge reads the mesh again: shards need a file, not the standard input";
@@ -63,29 +125,29 @@ impl Bake<'_> {
         let mut files = Files::default();
         chunks::declare(self.outputs, self.chunks.shard, &mut files)?;
         let json = ("--json", self.json.map(Destination::path));
-        for (purpose, path) in written.iter().chain([&json]) {
+        for (purpose, path) in written.into_iter().chain([json]) {
             path.map_or(Ok(()), |path| files.writes(purpose, path))?;
         }
-        for file in self.parts.unwrap_or_default() {
-            files.reads("the part", &file.path)?;
-        }
+        let parts = self.parts.unwrap_or_default().iter();
+        let parts = parts.map(|file| ("the part", Some(&*file.path)));
         let scene = ("the scene", Some(self.scene));
-        for (purpose, path) in [&scene].into_iter().chain(read) {
+        for (purpose, path) in parts.chain([scene]).chain(read) {
             path.map_or(Ok(()), |path| files.reads(purpose, path))?;
         }
         files.check()?;
         Ok(files)
     }
 
-    /// Starts the threads, reads the scene and builds its tree.
-    pub fn ground(
-        &self,
-        isa: Isa,
-        memory: MemorySize,
-        files: &mut Files,
-    ) -> Result<Ground, Failure> {
+    /// Starts the threads, reads the scene and builds its tree. An `earth` bends the scene.
+    pub fn ground(&self, files: &mut Files, earth: Option<Earth<'_>>) -> Result<Ground, Failure> {
         self.machine.start_threads()?;
-        Ground::load(self.scene, isa, memory, files, self.earth)
+        Ground::load(self.scene, self.isa, self.memory, files, earth)
+    }
+
+    /// Starts the threads and reads a height raster, for a job without a mesh and without a tree.
+    pub fn terrain(&self, files: &mut Files) -> Result<Terrain, Failure> {
+        self.machine.start_threads()?;
+        Terrain::load(self.scene, self.memory, files)
     }
 
     /// Computes a job, or one share of it, with a tree of the scene. With parts, joins them instead.
@@ -99,8 +161,13 @@ impl Bake<'_> {
         self.compute_known(job, (&ground.loaded.scene.name, key), bvh)
     }
 
-    /// [`compute`](Self::compute) of a job with a name for the progress and a key of its own.
-    pub fn compute_known<J: Job>(
+    /// Computes a job on a height raster.
+    pub fn compute_cells<J: Job>(&self, job: &J, name: &str) -> Result<Done<J::Found>, Failure> {
+        let no_tree = Bvh::build(&[], &Recipe::default()).map_err(Failure::work)?;
+        self.compute_known(job, (name, Key::of(job, |_| {})), &no_tree)
+    }
+
+    fn compute_known<J: Job>(
         &self,
         job: &J,
         (name, key): (&str, u64),
@@ -149,15 +216,6 @@ impl Bake<'_> {
         ))
     }
 
-    /// Beginning of the JSON document.
-    pub fn head<'g>(&self, schema: &'static str, isa: Isa, scene: &'g str) -> Head<'g> {
-        Head {
-            schema,
-            machine: version::machine(isa),
-            scene,
-        }
-    }
-
     /// Names of the outputs.
     pub fn output_names(&self) -> Vec<String> {
         self.outputs.iter().map(|path| text(path)).collect()
@@ -168,24 +226,41 @@ impl Bake<'_> {
         self.chunks.shard.map(|shard| shard.to_string())
     }
 
-    /// Prints what was done and written: `number` things in so many seconds, or the things of the merged parts.
-    pub fn tell_done(&self, things: &str, number: u64, seconds: f64) {
+    /// Writes the document, if it is wanted. Says where a share was written, and `more`; false then, since nothing else is known.
+    pub fn document<T>(
+        &self,
+        (schema, scene): (&str, &str),
+        figures: &[Figure<'_>],
+        (done, more): (&Done<T>, &str),
+    ) -> Result<bool, Failure> {
+        let document = Document {
+            schema,
+            machine: version::machine(self.isa),
+            scene,
+            figures: Figures(figures),
+        };
+        json::write(&document, self.json)?;
+        if done.found.is_none() {
+            let outputs = self.output_names().join(", ");
+            tell(format_args!("wrote {outputs}, for merge{more}"));
+        }
+        Ok(done.found.is_some())
+    }
+
+    /// Ends a command that is done: says what was written, of `number` things in so many seconds or of merged parts.
+    pub fn end<T>(&self, things: &str, number: u64, done: &Done<T>) {
         let things = format!("{} {things}", count(number));
         let wrote = self.output_names().join(", ");
-        match self.parts {
-            Some(parts) => {
-                let parts = parts.len();
-                tell(format_args!(
-                    "{things}, merged from {parts} parts; wrote {wrote}"
-                ));
-            }
+        let how = match self.parts {
+            Some(parts) => format!(", merged from {} parts", parts.len()),
             None => {
-                let rate = number as f64 / 1e6 / seconds.max(1e-9);
-                tell(format_args!(
-                    "{things} in {seconds:.2} s, {rate:.1} million a second; wrote {wrote}"
-                ));
+                let (seconds, number) = (done.seconds, number as f64);
+                let rate = number / 1e6 / seconds.max(1e-9);
+                format!(" in {seconds:.2} s, {rate:.1} million a second")
             }
-        }
+        };
+        tell(format_args!("{things}{how}; wrote {wrote}"));
+        chunks::forget(done.checkpoint.as_deref());
     }
 }
 

@@ -111,28 +111,50 @@ pub fn field(text: &str) -> Cow<'_, str> {
 /// Decimals of coordinates that are measured from an origin.
 const MICRO: f64 = 1e6;
 
-/// Writes a table of sensors: their points in the world, the normals if `normals` are given, what else is known of
-/// each, and its values.
+/// A column of a table.
+pub struct Column<'a> {
+    name: String,
+    value: Box<dyn Fn(usize) -> f64 + 'a>,
+}
+
+impl<'a> Column<'a> {
+    /// A column with the value of each row.
+    pub fn new(name: impl Into<String>, value: impl Fn(usize) -> f64 + 'a) -> Self {
+        let (name, value) = (name.into(), Box::new(value));
+        Self { name, value }
+    }
+}
+
+/// Writes a table of sensors: their labels and more of them, points in the world, these normals if there are any, and columns.
 pub fn table(
     path: &Path,
-    (points, local): (&[[f32; 3]], LocalOrigin),
-    (normals, labels): (&[[f32; 3]], &[Label]),
-    (head, room): (&str, u64),
-    row: impl Fn(usize) -> Vec<f64>,
+    (sensors, normals, local): (&Sensors, &[[f32; 3]], LocalOrigin),
+    more_labels: &[Label],
+    columns: &[Column<'_>],
 ) -> Result<(), Failure> {
-    output::check_room(path, room * points.len() as u64)?;
+    let points = &sensors.points;
+    let labels = || sensors.labels.iter().chain(more_labels);
+    // About 10 bytes of each number.
+    output::check_room(path, 10 * (6 + columns.len() as u64) * points.len() as u64)?;
     Ok(atomic_write(path, |file| {
-        let normal_head = if normals.is_empty() { "" } else { ",nx,ny,nz" };
-        let mut label_head = String::new();
-        for label in labels {
-            label_head += &field(&label.column);
-            label_head.push(',');
-        }
-        writeln!(file, "{label_head}x,y,z{normal_head},{head}")?;
         let mut line = String::new();
+        for label in labels() {
+            line += &field(&label.column);
+            line.push(',');
+        }
+        line += if normals.is_empty() {
+            "x,y,z"
+        } else {
+            "x,y,z,nx,ny,nz"
+        };
+        for column in columns {
+            line.push(',');
+            line += &column.name;
+        }
+        writeln!(file, "{line}")?;
         for (index, point) in points.iter().enumerate() {
             line.clear();
-            for label in labels {
+            for label in labels() {
                 line += &field(&label.values[index]);
                 line.push(',');
             }
@@ -146,9 +168,9 @@ pub fn table(
             for x in normals.get(index).into_iter().flatten() {
                 let _ = write!(line, ",{x}");
             }
-            for x in row(index) {
+            for column in columns {
                 // More digits than any ray can tell.
-                let _ = write!(line, ",{}", (x * 1e9).round() / 1e9);
+                let _ = write!(line, ",{}", ((column.value)(index) * 1e9).round() / 1e9);
             }
             writeln!(file, "{line}")?;
         }

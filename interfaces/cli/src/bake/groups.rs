@@ -70,8 +70,6 @@ impl Baked<'_> {
         let groups = of(self.ground, self.args.by, &self.sunlight.orientation)?;
         let triangles = self.places.triangles(self.ground, self.up, &groups)?;
         let cover = Cover::new(&groups, self.sensors, &triangles);
-        let values = &self.found.values;
-        let reflected = self.reflected();
         let metres = self.args.places.units.metres();
         let whole: Vec<f64> = groups
             .areas
@@ -86,12 +84,8 @@ impl Baked<'_> {
         if let Some(spacing) = self.args.places.placement.surfaces {
             self.check_areas(&groups, &cover, &whole, spacing * spacing);
         }
-        let mut columns = vec![("hours", &values.hours), ("sky_view", &values.sky_view)];
-        if !values.direct.is_empty() {
-            columns.push(("direct_kwh_m2", &values.direct));
-            columns.push(("diffuse_kwh_m2", &values.diffuse));
-            columns.extend(reflected.iter().map(|list| ("reflected_kwh_m2", list)));
-        }
+        let mut columns = self.values();
+        columns.retain(|(name, _)| *name != "sky_open");
         let mut rows: Vec<Row> = Vec::new();
         for (names, area) in groups.names.iter().zip(&areas) {
             let mut row = Row(Vec::new());
@@ -102,7 +96,7 @@ impl Baked<'_> {
             rows.push(row);
         }
         for (index, (name, list)) in columns.into_iter().enumerate() {
-            let found = groups.statistics(&cover.open, list);
+            let found = groups.statistics(&cover.open, &list);
             for ((row, own), area) in rows.iter_mut().zip(found).zip(&areas) {
                 if index == 0 {
                     row.push("sensors", own.count.into());

@@ -3,147 +3,21 @@
 use std::path::Path;
 use std::time::Instant;
 
-use antumbra::{Bvh, Isa, LocalOrigin, Recipe};
-use antumbra_bake::{
-    Array, Entry, FieldHorizonJob, HeightField, HorizonJob, Key, Label, Observer, Orientation,
-    UpAxis,
-};
+use antumbra::LocalOrigin;
+use antumbra_bake::{Array, Entry, FieldHorizonJob, HorizonJob, Observer, Orientation, Sensors};
 use antumbra_lab::count;
-use antumbra_load::MemorySize;
 use antumbra_raster::{Quantity, RasterCells};
-use serde::Serialize;
 
-use super::chunks::{self, PartFile};
-use super::command::{Bake, Head};
-use super::files::{self, Format};
+use super::command::{Bake, Baking, Done, Figure, Named};
+use super::files::{self, Column, Format};
 use super::places::{self, Places};
 use super::raster;
 use super::site::Asked;
+use super::terrain::is_terrain;
 use crate::args::HorizonArgs;
 use crate::exit::{Failure, tell};
+use crate::interrupt;
 use crate::output::Files;
-use crate::{interrupt, json, scenes};
-
-/// The JSON document.
-#[derive(Serialize)]
-struct Document<'a> {
-    #[serde(flatten)]
-    head: Head<'a>,
-    outputs: Vec<String>,
-    shard: Option<String>,
-    triangles: usize,
-    sensors: usize,
-    azimuths: &'a [f64],
-    /// Mean over all sensors and azimuths.
-    mean_degrees: Option<f64>,
-    load_seconds: f64,
-    build_seconds: f64,
-    trace_seconds: f64,
-}
-
-/// Refuses outputs that cannot be made, before anything is read.
-pub fn check(args: &HorizonArgs) -> Result<(), Failure> {
-    let sentence = "horizons are written as csv, npz, tif, asc or npy";
-    for path in &args.output {
-        let known = ["csv", "npz", "tif", "tiff", "asc", "npy"];
-        if Format::of(path, &known, sentence)? != Format::Raster {
-            continue;
-        }
-        places::check_raster(path, &args.places, &args.scene)?;
-        if args.azimuths != 1 {
-            let path = path.display();
-            let reason = "a raster has one azimuth: --azimuths 1 with --first";
-            return Err(Failure::Usage(format!("{path}: {reason}")));
-        }
-    }
-    places::check(&args.places)
-}
-
-/// Runs the command, or merges parts of it.
-pub fn run(
-    args: &HorizonArgs,
-    memory: MemorySize,
-    parts: Option<&[PartFile]>,
-) -> Result<(), Failure> {
-    let isa = args.machine.isa()?;
-    if args.chunks.shard.is_none() {
-        check(args)?;
-    }
-    let bake = Bake {
-        scene: &args.scene,
-        outputs: &args.output,
-        json: args.json.as_ref(),
-        chunks: &args.chunks,
-        machine: &args.machine,
-        parts,
-        earth: None,
-    };
-    let read = [
-        ("--sensors", args.places.sensors.as_deref()),
-        ("--along", args.places.placement.along.as_deref()),
-    ];
-    let mut files = bake.declare(&[], &read)?;
-    let azimuths = args.degrees();
-    if args.places.vertices && raster::is_raster(&args.scene) && is_upright(args) {
-        return of_cells(args, &bake, files, &azimuths, (isa, memory));
-    }
-    let mut ground = bake.ground(isa, memory, &mut files)?;
-    let up = ground.up(args.places.up)?;
-    asked(args).of(&ground.loaded, up)?;
-    let places = Places::new(&args.places, &mut ground, up)?;
-    let compass = Orientation::new(up, args.places.north.degrees()).map_err(Failure::usage)?;
-    let sensors = &places.sensors;
-    let job = HorizonJob::new(&sensors.points, &sensors.normals, &azimuths, &compass)?;
-    let done = bake.compute(&job, &ground, &ground.bvh)?;
-    let document = Document {
-        head: bake.head("antumbra.horizon/1", isa, &ground.loaded.scene.name),
-        outputs: bake.output_names(),
-        shard: bake.shard(),
-        triangles: ground.mesh.indices.len(),
-        sensors: sensors.points.len(),
-        azimuths: &azimuths,
-        mean_degrees: None,
-        load_seconds: ground.loaded.seconds,
-        build_seconds: ground.build_seconds,
-        trace_seconds: done.seconds,
-    };
-    let Some(angles) = done.found else {
-        return document.end(args, &bake, None);
-    };
-    let _writing = interrupt::writing();
-    let table = Table {
-        azimuths: &azimuths,
-        angles: &angles,
-        points: &sensors.points,
-        local: ground.local,
-    };
-    for path in &args.output {
-        let labels = (&sensors.normals[..], &sensors.labels[..]);
-        if !table.write(path, labels)? {
-            let values = (sensors, &angles[..]);
-            let place = (args.raster.crs.as_ref(), args.places.units.metres());
-            raster::write(path, &ground, values, place, (up, QUANTITY))?;
-        }
-    }
-    ground.tell("");
-    document.end(args, &bake, Some(&angles))?;
-    chunks::forget(done.checkpoint.as_deref());
-    Ok(())
-}
-
-/// Flags that a coordinate system may answer.
-fn asked(args: &HorizonArgs) -> Asked<'_> {
-    Asked {
-        crs: args.raster.crs.as_ref(),
-        units: Some(&args.places.units),
-        north: Some(&args.places.north),
-    }
-}
-
-/// Whether a height raster is as it is on a map.
-fn is_upright(args: &HorizonArgs) -> bool {
-    args.places.up.is_none_or(|up| up == UpAxis::Z)
-}
 
 /// Name and unit of rasters.
 const QUANTITY: Quantity<'static> = Quantity {
@@ -151,169 +25,198 @@ const QUANTITY: Quantity<'static> = Quantity {
     unit: "degrees",
 };
 
+impl Baking for HorizonArgs {
+    fn check(&self) -> Result<(), Failure> {
+        let sentence = "horizons are written as csv, npz, tif, asc or npy";
+        for path in &self.output {
+            let known = ["csv", "npz", "tif", "tiff", "asc", "npy"];
+            if Format::of(path, &known, sentence)? != Format::Raster {
+                continue;
+            }
+            places::check_raster(path, &self.places, &self.scene)?;
+            if self.azimuths != 1 {
+                let path = path.display();
+                let reason = "a raster has one azimuth: --azimuths 1 with --first";
+                return Err(Failure::Usage(format!("{path}: {reason}")));
+            }
+        }
+        places::check(&self.places)
+    }
+
+    fn files(&self) -> [Vec<Named<'_>>; 2] {
+        [Vec::new(), self.places.files().to_vec()]
+    }
+
+    fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
+        let azimuths = self.degrees();
+        if self.places.vertices && is_terrain(&self.scene, self.places.up) {
+            return of_cells(self, bake, files, &azimuths);
+        }
+        let mut ground = bake.ground(&mut files, None)?;
+        let up = ground.up(self.places.up)?;
+        Asked::new(&self.raster, &self.places).of(&ground.loaded, up)?;
+        let places = Places::new(&self.places, &mut ground, up)?;
+        let compass = Orientation::new(up, self.places.north.degrees()).map_err(Failure::usage)?;
+        let sensors = &places.sensors;
+        let job = HorizonJob::new(&sensors.points, &sensors.normals, &azimuths, &compass)?;
+        let horizon = Horizon {
+            name: &ground.loaded.scene.name,
+            azimuths: &azimuths,
+            sensors,
+            local: ground.local,
+            triangles: ground.mesh.indices.len(),
+            seconds: [ground.loaded.seconds, ground.build_seconds],
+            done: bake.compute(&job, &ground, &ground.bvh)?,
+        };
+        let place = (self.raster.crs.as_ref(), self.places.units.metres());
+        horizon.write(bake, |path, angles| {
+            raster::write(path, &ground, (sensors, angles), place, (up, QUANTITY))
+        })?;
+        horizon.end(bake, || ground.tell(""))
+    }
+}
+
 /// The horizon of all cells of a height raster, without a mesh and without a tree.
 fn of_cells(
     args: &HorizonArgs,
     bake: &Bake<'_>,
     mut files: Files,
     azimuths: &[f64],
-    (isa, memory): (Isa, MemorySize),
 ) -> Result<(), Failure> {
-    bake.machine.start_threads()?;
-    let name = args.scene.file_stem().unwrap_or_default();
-    let name = name.to_string_lossy().into_owned();
+    let terrain = bake.terrain(&mut files)?;
     let start = Instant::now();
-    let heights = scenes::load_heights(&args.scene, memory)?;
-    files.reads_all(&heights.inputs)?;
-    let load_seconds = start.elapsed().as_secs_f64();
-    let Some(extent) = heights.extent else {
-        let reason = "it has no cell with data";
-        return Err(Failure::scene(&name, reason));
-    };
-    let start = Instant::now();
-    let grid = &heights.raster.grid;
-    let middle = extent.low.midpoint(extent.high).to_array();
-    asked(args).settle(&name, grid.crs.as_ref(), middle)?;
-    let values = &heights.raster.values;
-    let field = HeightField::new([grid.width, grid.height], values, grid.transform)?;
+    terrain.settle(&Asked::new(&args.raster, &args.places))?;
+    let field = terrain.field()?;
+    let (grid, values) = (
+        terrain.grid(args.raster.crs.as_ref()),
+        &terrain.heights.raster.values,
+    );
     let has_data = |cell: &usize| values[*cell].is_finite();
     let cells: Vec<usize> = (0..values.len()).filter(has_data).collect();
     let rise = args.places.placement.height / args.places.units.metres();
-    let observers: Vec<Observer> = cells
-        .iter()
-        .map(|&cell| Observer {
-            place: [cell % grid.width, cell / grid.width].map(|at| at as f64),
-            height: values[cell] + rise,
-            normal: [0.0; 3],
-        })
-        .collect();
+    let observer = |&cell: &usize| Observer {
+        place: [cell % grid.width, cell / grid.width].map(|at| at as f64),
+        height: values[cell] + rise,
+        normal: [0.0; 3],
+    };
+    let observers: Vec<Observer> = cells.iter().map(observer).collect();
     // Clockwise from the north of the map.
-    let turned: Vec<f64> = azimuths
-        .iter()
-        .map(|azimuth| azimuth + args.places.north.degrees())
-        .collect();
+    let north = args.places.north.degrees();
+    let turned: Vec<f64> = azimuths.iter().map(|azimuth| azimuth + north).collect();
     let job = FieldHorizonJob::new(&field, &observers, &turned, 0.0)?;
     let build_seconds = start.elapsed().as_secs_f64();
-    let no_tree =
-        Bvh::build(&[], &Recipe::default()).map_err(|error| Failure::work(error.to_string()))?;
-    let key = Key::of(&job, |_| {});
-    let done = bake.compute_known(&job, (&name, key), &no_tree)?;
-    let document = Document {
-        head: bake.head("antumbra.horizon/1", isa, &name),
-        outputs: bake.output_names(),
-        shard: bake.shard(),
-        triangles: field.triangles(),
-        sensors: observers.len(),
+    let local = terrain.local();
+    let point = |&cell: &usize| {
+        let [x, y] = grid.centre(cell % grid.width, cell / grid.width);
+        local.local([x, y, values[cell]])
+    };
+    let horizon = Horizon {
+        name: &terrain.name,
         azimuths,
-        mean_degrees: None,
-        load_seconds,
-        build_seconds,
-        trace_seconds: done.seconds,
-    };
-    let Some(angles) = done.found else {
-        return document.end(args, bake, None);
-    };
-    let _writing = interrupt::writing();
-    let local = LocalOrigin {
-        origin: extent.local_origin().to_array(),
-    };
-    let points: Vec<[f32; 3]> = cells
-        .iter()
-        .map(|&cell| {
-            let [x, y] = grid.centre(cell % grid.width, cell / grid.width);
-            local.local([x, y, values[cell]])
-        })
-        .collect();
-    let table = Table {
-        azimuths,
-        angles: &angles,
-        points: &points,
+        sensors: &Sensors {
+            points: cells.iter().map(point).collect(),
+            ..Sensors::default()
+        },
         local,
+        triangles: field.triangles(),
+        seconds: [terrain.load_seconds, build_seconds],
+        done: bake.compute_cells(&job, &terrain.name)?,
     };
-    for path in &args.output {
-        if !table.write(path, (&[], &[]))? {
-            let mut all = RasterCells {
-                grid: grid.clone(),
-                cells: cells.iter().map(|&cell| cell as u32).collect(),
-            };
-            if let Some(crs) = &args.raster.crs {
-                all.grid.crs = Some(crs.clone());
-            }
-            raster::write_cells(path, &all, &angles, QUANTITY)?;
-        }
-    }
-    document.end(args, bake, Some(&angles))?;
-    chunks::forget(done.checkpoint.as_deref());
-    Ok(())
+    horizon.write(bake, |path, angles| {
+        let all = RasterCells {
+            grid: grid.clone(),
+            cells: cells.iter().map(|&cell| cell as u32).collect(),
+        };
+        raster::write_cells(path, &all, angles, QUANTITY)
+    })?;
+    horizon.end(bake, || ())
 }
 
 /// Angles of sensors.
-struct Table<'a> {
+struct Horizon<'a> {
+    /// Name of the scene.
+    name: &'a str,
     azimuths: &'a [f64],
-    angles: &'a [f32],
-    points: &'a [[f32; 3]],
+    sensors: &'a Sensors,
     local: LocalOrigin,
+    triangles: usize,
+    /// Seconds of loading and of building.
+    seconds: [f64; 2],
+    done: Done<Vec<f32>>,
 }
 
-impl Table<'_> {
-    /// Writes a table or arrays; false for a raster, which is written otherwise.
-    fn write(&self, path: &Path, labels: (&[[f32; 3]], &[Label])) -> Result<bool, Failure> {
-        let width = self.azimuths.len();
-        match Format::of_sensors(path)? {
-            Format::Csv => {
-                // Whole degrees are the rule, and their names sort.
-                let column = |azimuth: &f64| match azimuth.fract() == 0.0 {
-                    true => format!("horizon_{azimuth:03}"),
-                    false => format!("horizon_{azimuth:06.2}"),
-                };
-                let head: Vec<String> = self.azimuths.iter().map(column).collect();
-                let head = (&head.join(",")[..], 10 * (4 + width as u64));
-                files::table(path, (self.points, self.local), labels, head, |row| {
-                    let angles = &self.angles[row * width..][..width];
-                    let rounded = |&angle: &f32| (f64::from(angle) * 1e4).round() / 1e4;
-                    angles.iter().map(rounded).collect()
-                })?;
-            }
-            Format::Npz => {
-                let entries = [
-                    Entry::new("horizon", Array::F32(self.angles)).columns(width),
-                    Entry::new("azimuths", Array::F64(self.azimuths)),
-                    Entry::new("points", Array::Places(self.points, self.local)),
-                ];
-                files::npz(path, &entries)?;
-            }
-            _ => return Ok(false),
-        }
-        Ok(true)
-    }
-}
-
-impl Document<'_> {
-    /// Says what was done, or that a share is there for `merge`.
-    fn end(
-        mut self,
-        args: &HorizonArgs,
+impl Horizon<'_> {
+    /// Writes all outputs; `raster` those that are rasters.
+    fn write(
+        &self,
         bake: &Bake<'_>,
-        angles: Option<&[f32]>,
+        raster: impl Fn(&Path, &[f32]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let Some(angles) = angles else {
-            json::write(&self, args.json.as_ref())?;
-            let outputs = self.outputs.join(", ");
-            tell(format_args!("wrote {outputs}, for merge"));
+        let Some(angles) = &self.done.found else {
             return Ok(());
         };
+        let _writing = interrupt::writing();
+        let (width, sensors) = (self.azimuths.len(), self.sensors);
+        bake.outputs
+            .iter()
+            .try_for_each(|path| match Format::of_sensors(path)? {
+                Format::Csv => {
+                    let column = |(at, azimuth): (usize, &f64)| {
+                        // Whole degrees are the rule, and their names sort.
+                        let name = match azimuth.fract() == 0.0 {
+                            true => format!("horizon_{azimuth:03}"),
+                            false => format!("horizon_{azimuth:06.2}"),
+                        };
+                        let angle = move |row: usize| f64::from(angles[row * width + at]);
+                        Column::new(name, move |row| (angle(row) * 1e4).round() / 1e4)
+                    };
+                    let columns: Vec<Column<'_>> =
+                        self.azimuths.iter().enumerate().map(column).collect();
+                    files::table(path, (sensors, &sensors.normals, self.local), &[], &columns)
+                }
+                Format::Npz => {
+                    let entries = [
+                        Entry::new("horizon", Array::F32(angles)).columns(width),
+                        Entry::new("azimuths", Array::F64(self.azimuths)),
+                        Entry::new("points", Array::Places(&sensors.points, self.local)),
+                    ];
+                    files::npz(path, &entries)
+                }
+                _ => raster(path, angles),
+            })
+    }
+
+    /// Writes the document, and says what was done: first of the scene by `tell_scene`.
+    fn end(&self, bake: &Bake<'_>, tell_scene: impl Fn()) -> Result<(), Failure> {
+        let angles = self.done.found.as_deref().unwrap_or_default();
         let known = || angles.iter().filter(|angle| !angle.is_nan());
-        let number = known().count();
-        let sum: f64 = known().map(|&angle| f64::from(angle)).sum();
-        self.mean_degrees = (number > 0).then(|| sum / number as f64);
-        json::write(&self, args.json.as_ref())?;
-        tell(format_args!(
-            "{} sensors, {} azimuths; the horizon is {:.2} degrees high on average",
-            count(self.sensors as u64),
-            self.azimuths.len(),
-            self.mean_degrees.unwrap_or(f64::NAN),
-        ));
-        bake.tell_done("angles", angles.len() as u64, self.trace_seconds);
+        let (sum, number) = (
+            known().map(|&angle| f64::from(angle)).sum::<f64>(),
+            known().count(),
+        );
+        let mean = (number > 0).then(|| sum / number as f64);
+        let figures: &[Figure<'_>] = &[
+            ("outputs", &bake.output_names()),
+            ("shard", &bake.shard()),
+            ("triangles", &self.triangles),
+            ("sensors", &self.sensors.points.len()),
+            ("azimuths", &self.azimuths),
+            ("mean_degrees", &mean),
+            ("load_seconds", &self.seconds[0]),
+            ("build_seconds", &self.seconds[1]),
+            ("trace_seconds", &self.done.seconds),
+        ];
+        let name = ("antumbra.horizon/1", self.name);
+        if bake.document(name, figures, (&self.done, ""))? {
+            tell_scene();
+            tell(format_args!(
+                "{} sensors, {} azimuths; the horizon is {:.2} degrees high on average",
+                count(self.sensors.points.len() as u64),
+                self.azimuths.len(),
+                mean.unwrap_or(f64::NAN),
+            ));
+            bake.end("angles", angles.len() as u64, &self.done);
+        }
         Ok(())
     }
 }

@@ -4,8 +4,7 @@ use antumbra_load::MemorySize;
 use clap::Parser;
 
 use super::chunks::PartFile;
-use super::{ao, factors, horizon, sun, visible};
-use crate::args::{Cli, Command, MergeArgs};
+use crate::args::{BakeCommand, Cli, Command, MergeArgs, of_bake};
 use crate::exit::Failure;
 
 /// Joins parts, and writes what the command would have written without `--shard`. Outputs are named by the command line only:
@@ -22,38 +21,26 @@ pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
     let name = first.path.display();
     let cli = Cli::try_parse_from(&first.part.identity.command)
         .map_err(|error| Failure::Data(format!("{name}: its command: {error}")))?;
-    let (output, json) = (args.output.clone(), args.json.clone());
-    if args.lines.is_some() && !matches!(cli.command, Some(Command::Visible(_))) {
-        let reason = "--lines: only parts of visible have lines of sight";
-        return Err(Failure::Usage(reason.into()));
+    let Some(Command::Bake(mut bake)) = cli.command else {
+        return Err(Failure::Data(format!("{name}: it was made by no bake")));
+    };
+    match &mut bake {
+        BakeCommand::Visible(visible) => visible.lines.clone_from(&args.lines),
+        _ if args.lines.is_some() => {
+            let reason = "--lines: only parts of visible have lines of sight";
+            return Err(Failure::Usage(reason.into()));
+        }
+        BakeCommand::Ao(_) if args.output.len() != 1 => {
+            return Err(Failure::Usage("--output: ao writes one file".into()));
+        }
+        _ => {}
     }
-    match cli.command {
-        Some(Command::Ao(mut bake)) => {
-            let Ok([output]) = <[_; 1]>::try_from(output) else {
-                return Err(Failure::Usage("--output: ao writes one file".into()));
-            };
-            (bake.chunks.shard, bake.output, bake.json) = (None, output, json);
-            ao::run(&bake, memory, Some(&parts))
-        }
-        Some(Command::Sun(mut bake)) => {
-            (bake.chunks.shard, bake.output, bake.json) = (None, output, json);
-            sun::run(&bake, memory, Some(&parts))
-        }
-        Some(Command::Visible(mut bake)) => {
-            (bake.chunks.shard, bake.output, bake.json) = (None, output, json);
-            bake.lines.clone_from(&args.lines);
-            visible::run(&bake, memory, Some(&parts))
-        }
-        Some(Command::Horizon(mut bake)) => {
-            (bake.chunks.shard, bake.output, bake.json) = (None, output, json);
-            horizon::run(&bake, memory, Some(&parts))
-        }
-        Some(Command::Factors(mut bake)) => {
-            (bake.chunks.shard, bake.output, bake.json) = (None, output, json);
-            factors::run(&bake, memory, Some(&parts))
-        }
-        _ => Err(Failure::Data(format!("{name}: it was made by no bake"))),
-    }
+    of_bake!(&mut bake, bake => {
+        bake.chunks.shard = None;
+        bake.output.clone_from(&args.output);
+        bake.json.clone_from(&args.json);
+    });
+    super::run(&bake, memory, Some(&parts))
 }
 
 /// Reads the parts: no share may be there twice.

@@ -6,6 +6,7 @@ use antumbra::{Bvh, Geometry, Recipe};
 use antumbra_bake::{Flat, Groups, Orientation, Placement, Sensors, UpAxis};
 use antumbra_lab::count;
 
+use super::command::Named;
 use super::ground::{self, Ground};
 use super::raster;
 use crate::args::PlaceArgs;
@@ -40,6 +41,16 @@ pub fn check_raster(path: &Path, args: &PlaceArgs, scene: &Path) -> Result<(), F
     let path = path.display();
     let reason = "a raster needs --grid from above, or --cells of a scene that is one";
     Err(Failure::Usage(format!("{path}: {reason}")))
+}
+
+impl PlaceArgs {
+    /// Files with sensors.
+    pub fn files(&self) -> [Named<'_>; 2] {
+        [
+            ("--sensors", self.sensors.as_deref()),
+            ("--along", self.placement.along.as_deref()),
+        ]
+    }
 }
 
 impl Places {

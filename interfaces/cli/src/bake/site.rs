@@ -5,7 +5,7 @@ use antumbra_load::{Extent, Loaded};
 use antumbra_raster::{Crs, Site, unit_name};
 
 use super::map;
-use crate::args::{NorthArgs, UnitArgs};
+use crate::args::{NorthArgs, PlaceArgs, RasterArgs, UnitArgs};
 use crate::exit::{Failure, say, tell};
 
 /// Degrees that grid north may differ from what the command line says.
@@ -22,7 +22,16 @@ pub struct Asked<'a> {
     pub north: Option<&'a NorthArgs>,
 }
 
-impl Asked<'_> {
+impl<'a> Asked<'a> {
+    /// The flags of a command that places sensors.
+    pub fn new(raster: &'a RasterArgs, places: &'a PlaceArgs) -> Self {
+        Self {
+            crs: raster.crs.as_ref(),
+            units: Some(&places.units),
+            north: Some(&places.north),
+        }
+    }
+
     /// The place of a scene that was read. Settles unit and north.
     pub fn of(&self, loaded: &Loaded, up: UpAxis) -> Result<Option<Site>, Failure> {
         let scene = &loaded.scene;

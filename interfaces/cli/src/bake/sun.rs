@@ -1,5 +1,6 @@
 //! `antumbra sun`: hours of direct sun, sky view factors and irradiation of sensors.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -8,13 +9,10 @@ use antumbra_bake::{
     SunValues, Sunlight, SunlightClass, Surface, UpAxis,
 };
 use antumbra_lab::count;
-use antumbra_load::MemorySize;
 use antumbra_raster::Quantity;
-use serde::Serialize;
 
-use super::chunks::{self, PartFile};
-use super::command::{Bake, Head};
-use super::files::{self, Format};
+use super::command::{Bake, Baking, Figure, Named};
+use super::files::{self, Column, Format};
 use super::ground::Ground;
 use super::map::{self, Plan, Words};
 use super::places::{self, Places};
@@ -22,41 +20,8 @@ use super::when::{self, When, read_weather};
 use super::{frames, groups, hourly, raster};
 use crate::args::{Shown, SunArgs};
 use crate::exit::{Failure, say, tell};
-use crate::{interrupt, json};
-
-/// The JSON document.
-#[derive(Serialize)]
-struct Document<'a> {
-    #[serde(flatten)]
-    head: Head<'a>,
-    outputs: Vec<String>,
-    shard: Option<String>,
-    triangles: usize,
-    sensors: usize,
-    place: Option<String>,
-    latitude: f64,
-    longitude: f64,
-    timezone: f64,
-    /// Hours ahead of UTC, as people read them: two where the clocks change.
-    #[serde(skip)]
-    zones: String,
-    /// Steps of time, and those with a sun above the horizon.
-    steps: usize,
-    suns: usize,
-    step_hours: f64,
-    patches: usize,
-    rays: u64,
-    mean_hours: Option<f64>,
-    mean_sky_view: Option<f64>,
-    mean_direct_kwh_m2: Option<f64>,
-    mean_diffuse_kwh_m2: Option<f64>,
-    /// Rows of --groups.
-    groups: Option<Vec<groups::Row>>,
-    load_seconds: f64,
-    build_seconds: f64,
-    trace_seconds: f64,
-    total_seconds: f64,
-}
+use crate::interrupt;
+use crate::output::Files;
 
 /// Everything that files are made of.
 pub struct Baked<'a> {
@@ -72,39 +37,136 @@ pub struct Baked<'a> {
     pub up: UpAxis,
 }
 
-/// Refuses outputs that cannot be made, before anything is read.
-pub fn check(args: &SunArgs) -> Result<(), Failure> {
-    for path in &args.output {
-        if Format::of_sensors(path)? == Format::Picture && args.places.grid.is_none() {
-            let path = path.display();
-            return Err(Failure::Usage(format!("{path}: a map needs --grid")));
+impl Baking for SunArgs {
+    fn check(&self) -> Result<(), Failure> {
+        for path in &self.output {
+            match Format::of_sensors(path)? {
+                Format::Picture if self.places.grid.is_none() => {
+                    let path = path.display();
+                    return Err(Failure::Usage(format!("{path}: a map needs --grid")));
+                }
+                Format::Raster => places::check_raster(path, &self.places, &self.scene)?,
+                _ => {}
+            }
         }
-        if Format::of_sensors(path)? == Format::Raster {
-            places::check_raster(path, &args.places, &args.scene)?;
+        places::check(&self.places)?;
+        when::check(self)?;
+        if self.frames.is_some() && self.places.grid.is_none() {
+            return Err(Failure::Usage("--frames: maps need --grid".into()));
         }
+        self.frames.as_deref().map(frames::is_gif).transpose()?;
+        self.groups.as_deref().map(groups::is_table).transpose()?;
+        if self.en17037 {
+            check_day(self)?;
+        }
+        self.map.check()?;
+        self.hourly.as_deref().map(hourly::format).transpose()?;
+        if self.epw.is_none() && !matches!(self.show, Shown::Hours | Shown::SkyView) {
+            return Err(Failure::Usage("--show: irradiation needs --epw".into()));
+        }
+        Ok(())
     }
-    places::check(&args.places)?;
-    when::check(args)?;
-    if args.frames.is_some() && args.places.grid.is_none() {
-        return Err(Failure::Usage("--frames: maps need --grid".into()));
+
+    fn files(&self) -> [Vec<Named<'_>>; 2] {
+        let mut read = self.places.files().to_vec();
+        read.push(("--epw", self.epw.as_deref()));
+        let written = vec![
+            ("--hourly", self.hourly.as_deref()),
+            ("--groups", self.groups.as_deref()),
+            ("--frames", self.frames.as_deref()),
+        ];
+        [written, read]
     }
-    args.frames
-        .as_deref()
-        .map_or(Ok(()), |path| frames::is_gif(path).map(drop))?;
-    args.groups
-        .as_deref()
-        .map_or(Ok(()), |path| groups::is_table(path).map(drop))?;
-    if args.en17037 {
-        check_day(args)?;
+
+    fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
+        let begin = Instant::now();
+        let weather = self.epw.as_deref().map(read_weather).transpose()?;
+        let mut ground = bake.ground(&mut files, None)?;
+        let up = ground.up(self.places.up)?;
+        let (when, sunlight) = When::at(self, weather.as_ref(), &ground, up)?;
+        if let Some(path) = &self.frames {
+            frames::declare(path, &sunlight, &mut files)?;
+        }
+        let places = Places::new(&self.places, &mut ground, up)?;
+        if self.groups.is_some() && ground.surfaces.is_none() {
+            ground.face(&sunlight.orientation);
+        }
+        let sensors = &places.sensors;
+        let job = SunJob::new(&sensors.points, &sensors.normals, &sunlight)?;
+        let done = bake.compute(&job, &ground, &ground.bvh)?;
+        let baked = done.found.as_ref().map(|found| Baked {
+            ground: &ground,
+            places: &places,
+            sensors,
+            sunlight: &sunlight,
+            found,
+            args: self,
+            when: &when,
+            weather: weather.as_ref().map(|weather| &*weather.name),
+            up,
+        });
+        let mut groups = None;
+        if let Some(baked) = &baked {
+            let _writing = interrupt::writing();
+            bake.outputs.iter().try_for_each(|path| baked.write(path))?;
+            self.hourly.iter().try_for_each(|path| baked.hourly(path))?;
+            self.frames.iter().try_for_each(|path| baked.frames(path))?;
+            groups = self
+                .groups
+                .as_deref()
+                .map(|path| baked.groups(path))
+                .transpose()?;
+        }
+        let means = done.found.as_ref().map(|found| {
+            let SunValues {
+                hours,
+                sky_view,
+                direct,
+                diffuse,
+                ..
+            } = &found.values;
+            [hours, sky_view, direct, diffuse].map(|list| mean(list))
+        });
+        let means @ [hours, view, direct, diffuse] = means.unwrap_or_default();
+        let rays = baked.as_ref().map_or(0, |_| job.rays());
+        let (of, suns) = (sensors.points.len(), &sunlight.suns);
+        let total = begin.elapsed().as_secs_f64();
+        let figures: &[Figure<'_>] = &[
+            ("outputs", &bake.output_names()),
+            ("shard", &bake.shard()),
+            ("triangles", &ground.mesh.indices.len()),
+            ("sensors", &of),
+            ("place", &weather.as_ref().map(|weather| &weather.name)),
+            ("latitude", &when.place.latitude),
+            ("longitude", &when.place.longitude),
+            ("timezone", &when.zone),
+            ("steps", &sunlight.steps()),
+            ("suns", &suns.times.len()),
+            (
+                "step_hours",
+                &suns.hours.first().copied().unwrap_or_default(),
+            ),
+            ("patches", &sunlight.patches.len()),
+            ("rays", &rays),
+            ("mean_hours", &hours),
+            ("mean_sky_view", &view),
+            ("mean_direct_kwh_m2", &direct),
+            ("mean_diffuse_kwh_m2", &diffuse),
+            ("groups", &groups),
+            ("load_seconds", &ground.loaded.seconds),
+            ("build_seconds", &ground.build_seconds),
+            ("trace_seconds", &done.seconds),
+            ("total_seconds", &total),
+        ];
+        let name = ("antumbra.sun/1", &*ground.loaded.scene.name);
+        bake.document(name, figures, (&done, &format!("; {total:.2} s")))?;
+        if let Some(baked) = &baked {
+            ground.tell("");
+            baked.tell(means);
+            bake.end("rays", rays, &done);
+        }
+        Ok(())
     }
-    args.map.check()?;
-    args.hourly
-        .as_deref()
-        .map_or(Ok(()), |path| hourly::format(path).map(drop))?;
-    if args.epw.is_none() && !matches!(args.show, Shown::Hours | Shown::SkyView) {
-        return Err(Failure::Usage("--show: irradiation needs --epw".into()));
-    }
-    Ok(())
 }
 
 /// Refuses times that EN 17037 does not mean.
@@ -121,124 +183,6 @@ fn check_day(args: &SunArgs) -> Result<(), Failure> {
             "--en17037: wanted --from and --to on one day from 1 February to 21 March, and --step of at most 10".into(),
         )),
     }
-}
-
-/// Runs the command, or merges parts of it.
-pub fn run(args: &SunArgs, memory: MemorySize, parts: Option<&[PartFile]>) -> Result<(), Failure> {
-    let begin = Instant::now();
-    let isa = args.machine.isa()?;
-    if args.chunks.shard.is_none() {
-        check(args)?;
-    }
-    let bake = Bake {
-        scene: &args.scene,
-        outputs: &args.output,
-        json: args.json.as_ref(),
-        chunks: &args.chunks,
-        machine: &args.machine,
-        parts,
-        earth: None,
-    };
-    let read = [
-        ("--sensors", args.places.sensors.as_deref()),
-        ("--along", args.places.placement.along.as_deref()),
-        ("--epw", args.epw.as_deref()),
-    ];
-    let world_files = map::world_files(&args.output)?;
-    let mut written = vec![
-        ("--hourly", args.hourly.as_deref()),
-        ("--groups", args.groups.as_deref()),
-        ("--frames", args.frames.as_deref()),
-    ];
-    written.extend(
-        world_files
-            .iter()
-            .map(|path| ("the world file", Some(&**path))),
-    );
-    let mut files = bake.declare(&written, &read)?;
-    let weather = args.epw.as_deref().map(read_weather).transpose()?;
-    let mut ground = bake.ground(isa, memory, &mut files)?;
-    let up = ground.up(args.places.up)?;
-    let (when, sunlight) = When::at(args, weather.as_ref(), &ground, up)?;
-    if let Some(path) = &args.frames {
-        frames::declare(path, &sunlight, &mut files)?;
-    }
-    let places = Places::new(&args.places, &mut ground, up)?;
-    if args.groups.is_some() && ground.surfaces.is_none() {
-        ground.face(&sunlight.orientation);
-    }
-    let sensors = &places.sensors;
-    let job = SunJob::new(&sensors.points, &sensors.normals, &sunlight)?;
-    let done = bake.compute(&job, &ground, &ground.bvh)?;
-    let mut document = Document {
-        place: weather.as_ref().map(|weather| weather.name.clone()),
-        trace_seconds: done.seconds,
-        ..Document::new(
-            &bake,
-            bake.head("antumbra.sun/1", isa, &ground.loaded.scene.name),
-            &ground,
-            &when,
-        )
-    };
-    document.describe(sensors, &sunlight);
-    let Some(found) = done.found else {
-        document.total_seconds = begin.elapsed().as_secs_f64();
-        json::write(&document, args.json.as_ref())?;
-        tell(format_args!(
-            "wrote {}, for merge; {:.2} s",
-            document.outputs.join(", "),
-            document.total_seconds
-        ));
-        return Ok(());
-    };
-    let baked = Baked {
-        ground: &ground,
-        places: &places,
-        sensors,
-        sunlight: &sunlight,
-        found: &found,
-        args,
-        when: &when,
-        weather: weather.as_ref().map(|weather| &*weather.name),
-        up,
-    };
-    for path in &args.output {
-        baked.write(path)?;
-    }
-    if let Some(path) = &args.hourly {
-        baked.hourly(path)?;
-    }
-    if let Some(path) = &args.frames {
-        baked.frames(path)?;
-    }
-    if let Some(path) = &args.groups {
-        document.groups = Some(baked.groups(path)?);
-    }
-    document.rays = job.rays();
-    document.fill(&found.values);
-    document.total_seconds = begin.elapsed().as_secs_f64();
-    json::write(&document, args.json.as_ref())?;
-    ground.tell("");
-    document.tell(args.en17037.then_some(args.min_elevation));
-    let without = found.values.hours.iter().filter(|x| x.is_nan()).count();
-    if without > 0 {
-        tell(format_args!(
-            "{} sensors without a normal have the value NaN",
-            count(without as u64)
-        ));
-    }
-    baked.tell_dark();
-    if args.places.sensors.is_some() {
-        warn_inside(
-            &ground,
-            &places.sensors,
-            &found.values.sky_open,
-            &sunlight.orientation,
-        );
-    }
-    bake.tell_done("rays", document.rays, document.trace_seconds);
-    chunks::forget(done.checkpoint.as_deref());
-    Ok(())
 }
 
 /// Warns of points of a table that are inside of bodies.
@@ -264,6 +208,52 @@ fn warn_inside(ground: &Ground, sensors: &Sensors, sky: &[f64], plan: &Orientati
 const DARK: f64 = 0.05;
 
 impl Baked<'_> {
+    /// Says what was found, with means of hours, sky view, direct and diffuse irradiation.
+    fn tell(&self, [hours, view, direct, diffuse]: [Option<f64>; 4]) {
+        let (args, sunlight, place) = (self.args, self.sunlight, &self.when.place);
+        let zones = match self.when.zones {
+            [winter, summer] if winter < summer => format!("UTC{winter:+} and {summer:+}"),
+            [zone, _] => format!("UTC{zone:+}"),
+        };
+        tell(format_args!(
+            "{} sensors, {} suns of {} steps at {:.4}, {:.4} and {zones}, {} patches",
+            count(self.sensors.points.len() as u64),
+            count(sunlight.suns.times.len() as u64),
+            count(sunlight.steps() as u64),
+            place.latitude,
+            place.longitude,
+            sunlight.patches.len(),
+        ));
+        if args.en17037 && args.min_elevation == 0.0 {
+            tell(format_args!(
+                "EN 17037: suns count from 0 degrees above the horizon; --min-elevation gives the angle of a country, such as 11 in Germany"
+            ));
+        }
+        if let (Some(hours), Some(view)) = (hours, view) {
+            tell(format_args!(
+                "mean: {hours:.1} hours of direct sun, sky view factor {view:.3}"
+            ));
+        }
+        if let (Some(direct), Some(diffuse)) = (direct, diffuse) {
+            tell(format_args!(
+                "mean: {direct:.1} kWh/m² from the sun, {diffuse:.1} from the sky"
+            ));
+        }
+        let values = &self.found.values;
+        let without = values.hours.iter().filter(|x| x.is_nan()).count();
+        if without > 0 {
+            tell(format_args!(
+                "{} sensors without a normal have the value NaN",
+                count(without as u64)
+            ));
+        }
+        self.tell_dark();
+        if args.places.sensors.is_some() {
+            let plan = &sunlight.orientation;
+            warn_inside(self.ground, self.sensors, &values.sky_open, plan);
+        }
+    }
+
     /// Says what is covered, and warns of sensors that see nothing of the sky although nobody would expect it.
     fn tell_dark(&self) {
         let sensors = self.sensors;
@@ -294,6 +284,25 @@ impl Baked<'_> {
         }
     }
 
+    /// Values of all sensors, by their names in files.
+    pub fn values(&self) -> Vec<(&'static str, Cow<'_, [f64]>)> {
+        let values = &self.found.values;
+        let mut all = vec![
+            ("hours", Cow::from(&values.hours)),
+            ("sky_view", Cow::from(&values.sky_view)),
+            ("sky_open", Cow::from(&values.sky_open)),
+        ];
+        if !values.direct.is_empty() {
+            all.push(("direct_kwh_m2", Cow::from(&values.direct)));
+            all.push(("diffuse_kwh_m2", Cow::from(&values.diffuse)));
+            all.extend(
+                self.reflected()
+                    .map(|list| ("reflected_kwh_m2", list.into())),
+            );
+        }
+        all
+    }
+
     /// The value that colours show, of every sensor.
     fn shown(&self) -> Vec<f32> {
         let values = &self.found.values;
@@ -304,11 +313,11 @@ impl Baked<'_> {
             Shown::Direct => &values.direct,
             Shown::Diffuse => &values.diffuse,
             Shown::Total => {
-                let reflected = self.reflected();
-                let add = |(row, total): (usize, f64)| {
-                    total + reflected.as_ref().map_or(0.0, |reflected| reflected[row])
-                };
-                total = values.total().into_iter().enumerate().map(add).collect();
+                let reflected = self
+                    .reflected()
+                    .unwrap_or_else(|| vec![0.0; self.sensors.points.len()]);
+                let pairs = values.total().into_iter().zip(reflected);
+                total = pairs.map(|(total, reflected)| total + reflected).collect();
                 &total
             }
         };
@@ -316,7 +325,7 @@ impl Baked<'_> {
     }
 
     /// Light from the ground, if it is wanted.
-    pub fn reflected(&self) -> Option<Vec<f64>> {
+    fn reflected(&self) -> Option<Vec<f64>> {
         let Sensors {
             points, normals, ..
         } = self.sensors;
@@ -324,58 +333,51 @@ impl Baked<'_> {
         Some(self.sunlight.reflected(albedo, normals, points.len()))
     }
 
-    /// Name and unit of the value that colours show.
-    fn quantity(&self) -> Quantity<'static> {
-        let (name, unit) = match self.args.show {
-            Shown::Hours => ("hours", "h"),
-            Shown::SkyView => ("sky_view", ""),
-            Shown::Direct => ("direct_kwh_m2", "kWh/m2"),
-            Shown::Diffuse => ("diffuse_kwh_m2", "kWh/m2"),
-            Shown::Total => ("total_kwh_m2", "kWh/m2"),
+    /// The value that colours show: its name and unit in files, and on maps.
+    fn quantities(&self) -> [Quantity<'static>; 2] {
+        let [name, unit, title, map_unit] = match self.args.show {
+            Shown::Hours => ["hours", "h", "Direct sun", "h"],
+            Shown::SkyView => ["sky_view", "", "Sky view factor", ""],
+            Shown::Direct => ["direct_kwh_m2", "kWh/m2", "Direct irradiation", "kWh/m²"],
+            Shown::Diffuse => ["diffuse_kwh_m2", "kWh/m2", "Diffuse irradiation", "kWh/m²"],
+            Shown::Total => {
+                let title = "Direct and diffuse irradiation";
+                ["total_kwh_m2", "kWh/m2", title, "kWh/m²"]
+            }
         };
-        Quantity { name, unit }
+        let on_maps = Quantity {
+            name: title,
+            unit: map_unit,
+        };
+        [Quantity { name, unit }, on_maps]
     }
 
     /// Writes one file.
     fn write(&self, path: &Path) -> Result<(), Failure> {
-        let _writing = interrupt::writing();
+        let (args, sensors) = (self.args, self.sensors);
+        let [quantity, on_map] = self.quantities();
         match Format::of_sensors(path)? {
             Format::Csv => self.csv(path),
             Format::Npz => self.npz(path),
-            Format::Picture => self.map(path),
+            Format::Picture => {
+                let time = (args.show != Shown::SkyView).then(|| self.period());
+                let words = self.words((on_map.name, on_map.unit), time);
+                let plan = self.plan();
+                map::Sheet::new(&args.map, &plan, sensors)?.write(path, &words, &self.shown())
+            }
             Format::Raster => {
-                let values = (self.sensors, &self.shown()[..]);
-                let place = (
-                    self.args.raster.crs.as_ref(),
-                    self.args.places.units.metres(),
-                );
-                raster::write(path, self.ground, values, place, (self.up, self.quantity()))
+                let values = (sensors, &self.shown()[..]);
+                let place = (args.raster.crs.as_ref(), args.places.units.metres());
+                raster::write(path, self.ground, values, place, (self.up, quantity))
             }
             Format::Ply | Format::Glb => {
-                let name = self.quantity().name;
                 let directions = self.sunlight.patch_directions();
                 let up = directions.last().copied().unwrap_or_default();
-                let values = (name, &self.shown()[..]);
+                let values = (quantity.name, &self.shown()[..]);
                 let mesh = (&self.ground.mesh, self.ground.local);
-                let colours = self.args.map.colours();
-                files::coloured(path, values, self.sensors, mesh, (up, colours))
+                files::coloured(path, values, sensors, mesh, (up, args.map.colours()))
             }
         }
-    }
-
-    fn map(&self, path: &Path) -> Result<(), Failure> {
-        let (quantity, unit) = match self.args.show {
-            Shown::Hours => ("Direct sun", "h"),
-            Shown::SkyView => ("Sky view factor", ""),
-            Shown::Direct => ("Direct irradiation", "kWh/m²"),
-            Shown::Diffuse => ("Diffuse irradiation", "kWh/m²"),
-            Shown::Total => ("Direct and diffuse irradiation", "kWh/m²"),
-        };
-        let time = (self.args.show != Shown::SkyView).then(|| self.period());
-        let words = self.words((quantity, unit), time);
-        let plan = self.plan();
-        let sheet = map::Sheet::new(&self.args.map, &plan, self.sensors)?;
-        sheet.write(path, &words, &self.shown())
     }
 
     /// Words on maps of a value at a time.
@@ -462,54 +464,32 @@ impl Baked<'_> {
     }
 
     fn csv(&self, path: &Path) -> Result<(), Failure> {
-        let (sensors, values) = (self.sensors, &self.found.values);
-        let covered = self.sunlight.suns.covered;
-        let months: Vec<usize> = (0..12).filter(|&month| covered[month]).collect();
-        let reflected = self.reflected();
-        let mut columns = vec![
-            ("hours", &values.hours),
-            ("sky_view", &values.sky_view),
-            ("sky_open", &values.sky_open),
+        let (sensors, values, all) = (self.sensors, &self.found.values, self.values());
+        let columns = all.iter();
+        let columns = columns.map(|(name, list)| Column::new(*name, |row| list[row]));
+        let mut columns: Vec<Column<'_>> = columns.collect();
+        // Lists of twelve values for each sensor, of which those of months with steps are written.
+        let by_month = [
+            ("hours", &values.by_month),
+            ("direct_kwh_m2", &values.direct_by_month),
+            ("diffuse_kwh_m2", &values.diffuse_by_month),
         ];
-        // Columns of twelve values for each sensor, of which those of months with steps are written.
-        let mut by_month = vec![("hours", &values.by_month)];
-        if !values.direct.is_empty() {
-            columns.extend([
-                ("direct_kwh_m2", &values.direct),
-                ("diffuse_kwh_m2", &values.diffuse),
-            ]);
-            columns.extend(reflected.iter().map(|list| ("reflected_kwh_m2", list)));
-            by_month.extend([
-                ("direct_kwh_m2", &values.direct_by_month),
-                ("diffuse_kwh_m2", &values.diffuse_by_month),
-            ]);
+        let known = if values.direct.is_empty() { 1 } else { 3 };
+        let covered = &self.sunlight.suns.covered;
+        for &(name, list) in &by_month[..known] {
+            let months = (0..12).filter(|&month| covered[month]);
+            columns.extend(months.map(|month| {
+                let name = format!("{name}_{:02}", month + 1);
+                Column::new(name, move |row| list[12 * row + month])
+            }));
         }
-        let mut head: Vec<String> = columns.iter().map(|(name, _)| (*name).to_owned()).collect();
-        for (name, _) in &by_month {
-            head.extend(
-                months
-                    .iter()
-                    .map(|month| format!("{name}_{:02}", month + 1)),
-            );
-        }
-        let room = 10 * (12 + (by_month.len() * months.len()) as u64);
-        let head = (&head.join(",")[..], room);
-        let points = (&sensors.points[..], self.ground.local);
-        let mut labels = sensors.labels.clone();
-        if self.args.en17037 {
-            let class = |&hours: &f64| SunlightClass::of_hours(hours).name().to_owned();
-            labels.push(Label {
-                column: "en17037".into(),
-                values: values.hours.iter().map(class).collect(),
-            });
-        }
-        files::table(path, points, (&sensors.normals, &labels), head, |row| {
-            let mut numbers: Vec<f64> = columns.iter().map(|(_, list)| list[row]).collect();
-            for (_, list) in &by_month {
-                numbers.extend(months.iter().map(|month| list[12 * row + month]));
-            }
-            numbers
-        })
+        let class = |&hours: &f64| SunlightClass::of_hours(hours).name().to_owned();
+        let classes = self.args.en17037.then(|| Label {
+            column: "en17037".into(),
+            values: values.hours.iter().map(class).collect(),
+        });
+        let places = (sensors, &sensors.normals[..], self.ground.local);
+        files::table(path, places, classes.as_slice(), &columns)
     }
 
     fn npz(&self, path: &Path) -> Result<(), Failure> {
@@ -566,85 +546,4 @@ fn mean(values: &[f64]) -> Option<f64> {
     let known = || values.iter().filter(|value| !value.is_nan());
     let count = known().count();
     (count > 0).then(|| known().sum::<f64>() / count as f64)
-}
-
-impl<'a> Document<'a> {
-    /// A document of the scene and the place.
-    fn new(bake: &Bake<'_>, head: Head<'a>, ground: &Ground, when: &When) -> Self {
-        Self {
-            head,
-            outputs: bake.output_names(),
-            shard: bake.shard(),
-            triangles: ground.mesh.indices.len(),
-            sensors: 0,
-            place: None,
-            latitude: when.place.latitude,
-            longitude: when.place.longitude,
-            timezone: when.zone,
-            zones: match when.zones {
-                [winter, summer] if winter < summer => format!("UTC{winter:+} and {summer:+}"),
-                [zone, _] => format!("UTC{zone:+}"),
-            },
-            steps: 0,
-            suns: 0,
-            step_hours: 0.0,
-            patches: 0,
-            rays: 0,
-            mean_hours: None,
-            mean_sky_view: None,
-            mean_direct_kwh_m2: None,
-            mean_diffuse_kwh_m2: None,
-            groups: None,
-            load_seconds: ground.loaded.seconds,
-            build_seconds: ground.build_seconds,
-            trace_seconds: 0.0,
-            total_seconds: 0.0,
-        }
-    }
-
-    /// Fills in counts of the sensors, the suns and the sky.
-    fn describe(&mut self, sensors: &Sensors, sunlight: &Sunlight) {
-        self.sensors = sensors.points.len();
-        self.steps = sunlight.steps();
-        self.suns = sunlight.suns.times.len();
-        self.step_hours = sunlight.suns.hours.first().copied().unwrap_or_default();
-        self.patches = sunlight.patches.len();
-    }
-
-    /// Fills in figures about the values.
-    fn fill(&mut self, values: &SunValues) {
-        self.mean_hours = mean(&values.hours);
-        self.mean_sky_view = mean(&values.sky_view);
-        self.mean_direct_kwh_m2 = mean(&values.direct);
-        self.mean_diffuse_kwh_m2 = mean(&values.diffuse);
-    }
-
-    /// Prints the figures. `en17037_from` is the least elevation of suns, where the standard is applied.
-    fn tell(&self, en17037_from: Option<f64>) {
-        tell(format_args!(
-            "{} sensors, {} suns of {} steps at {:.4}, {:.4} and {}, {} patches",
-            count(self.sensors as u64),
-            count(self.suns as u64),
-            count(self.steps as u64),
-            self.latitude,
-            self.longitude,
-            self.zones,
-            self.patches,
-        ));
-        if en17037_from == Some(0.0) {
-            tell(format_args!(
-                "EN 17037: suns count from 0 degrees above the horizon; --min-elevation gives the angle of a country, such as 11 in Germany"
-            ));
-        }
-        if let (Some(hours), Some(view)) = (self.mean_hours, self.mean_sky_view) {
-            tell(format_args!(
-                "mean: {hours:.1} hours of direct sun, sky view factor {view:.3}"
-            ));
-        }
-        if let (Some(direct), Some(diffuse)) = (self.mean_direct_kwh_m2, self.mean_diffuse_kwh_m2) {
-            tell(format_args!(
-                "mean: {direct:.1} kWh/m² from the sun, {diffuse:.1} from the sky"
-            ));
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! `antumbra visible`: visibility between points, and viewsheds.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use antumbra::{Aabb, LocalOrigin};
 use antumbra_bake::{
@@ -8,63 +8,114 @@ use antumbra_bake::{
 };
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
-use antumbra_load::MemorySize;
 use antumbra_raster::{Quantity, unit_name};
-use serde::Serialize;
 
-use super::chunks::{self, PartFile};
-use super::command::{Bake, Head, text};
-use super::files::{self, Format};
+use super::command::{Bake, Baking, Done, Figure, Named, text};
+use super::files::{self, Column, Format};
 use super::ground::{self, Earth, Ground};
 use super::map::{self, Plan, Words};
 use super::site::Asked;
 use super::{raster, viewshed};
 use crate::args::VisibleArgs;
 use crate::exit::{Failure, tell};
-use crate::{interrupt, json, output};
+use crate::output::Files;
+use crate::{interrupt, output};
 
-/// The JSON document.
-#[derive(Serialize)]
-pub struct Document<'a> {
-    #[serde(flatten)]
-    pub head: Head<'a>,
-    pub outputs: Vec<String>,
-    pub lines: Option<String>,
-    pub shard: Option<String>,
-    pub triangles: usize,
-    /// Points that look, and points that are looked at.
-    pub from: usize,
-    pub to: usize,
-    pub viewshed: bool,
-    pub pairs: u64,
-    pub visible_pairs: Option<u64>,
-    pub visible_share: Option<f64>,
-    pub load_seconds: f64,
-    pub build_seconds: f64,
-    pub trace_seconds: f64,
-}
+/// Name of the value of viewsheds in files.
+pub const SEEN_BY: Quantity<'static> = Quantity {
+    name: "seen_by",
+    unit: "",
+};
 
-/// Refuses outputs that cannot be made, before anything is read.
-pub fn check(args: &VisibleArgs) -> Result<(), Failure> {
-    for path in &args.output {
-        if Format::of_sensors(path)? == Format::Picture && args.grid.is_none() {
+impl Baking for VisibleArgs {
+    fn check(&self) -> Result<(), Failure> {
+        let refuse = |path: &Path, reason: &str| {
             let path = path.display();
-            let reason = format!("{path}: a map needs --viewshed with --grid");
-            return Err(Failure::Usage(reason));
+            Err(Failure::Usage(format!("{path}: {reason}")))
+        };
+        let has_cells = self.viewshed && (self.grid.is_some() || raster::is_raster(&self.scene));
+        for path in &self.output {
+            match Format::of_sensors(path)? {
+                Format::Picture if self.grid.is_none() => {
+                    return refuse(path, "a map needs --viewshed with --grid");
+                }
+                Format::Raster if !has_cells => {
+                    let reason =
+                        "a raster needs --viewshed, with --grid or of a scene that is a raster";
+                    return refuse(path, reason);
+                }
+                _ => {}
+            }
         }
-        let has_cells = args.viewshed && (args.grid.is_some() || raster::is_raster(&args.scene));
-        if Format::of_sensors(path)? == Format::Raster && !has_cells {
-            let path = path.display();
-            let reason = format!(
-                "{path}: a raster needs --viewshed, with --grid or of a scene that is a raster"
-            );
-            return Err(Failure::Usage(reason));
-        }
+        self.map.check()?;
+        let lines = self.lines.as_deref();
+        lines.map_or(Ok(()), |path| line_format(path).map(drop))
     }
-    args.map.check()?;
-    args.lines
-        .as_deref()
-        .map_or(Ok(()), |path| line_format(path).map(drop))
+
+    fn files(&self) -> [Vec<Named<'_>>; 2] {
+        let from = ("the points", Some(self.from.as_path()));
+        let to = ("the points", self.to.as_deref());
+        [vec![("--lines", self.lines.as_deref())], vec![from, to]]
+    }
+
+    fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
+        if viewshed::is_of_cells(self) {
+            return viewshed::run(self, bake, files);
+        }
+        let earth = self.curvature.then_some(Earth {
+            radius: self.earth_radius,
+            units: &self.units,
+            crs: self.raster.crs.as_ref(),
+            refraction: self.refraction,
+            up: self.up,
+        });
+        let ground = bake.ground(&mut files, earth)?;
+        let up = ground.up(self.up)?;
+        let site = asked(self).of(&ground.loaded, up)?;
+        let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
+        let points = Points::read(self, &ground, &plan)?;
+        points.warn_of_far_ones(self, &ground.bvh.bounds(), ground.local);
+        let (rows, columns) = points.eyes(self, &ground, &plan);
+        let job = VisibilityJob {
+            rows: &rows,
+            columns: columns.as_ref(),
+            margin: self.margin.map(|margin| margin as f32),
+            range: self.radius.map(|radius| (radius, plan.up)),
+        };
+        let done = bake.compute(&job, &ground, &ground.bvh)?;
+        if let Some(matrix) = &done.found {
+            let _writing = interrupt::writing();
+            let grid = Plan {
+                ground: &ground,
+                bvh: &ground.bvh,
+                orientation: &plan,
+                up,
+                cell: self.grid.unwrap_or_default(),
+                north: Some(site.map_or(0.0, |site| site.north)),
+                metres: self.units.known(),
+            };
+            write(self, &grid, &points.unbent(&ground), matrix)?;
+            if let Some(path) = &self.lines {
+                let ends = Ends {
+                    rows: &rows.points,
+                    columns: columns.as_ref().map(|eyes| &eyes.points[..]),
+                    curvature: ground.curvature,
+                    local: ground.local,
+                    is_viewshed: self.viewshed,
+                };
+                lines(path, &ends, matrix)?;
+            }
+        }
+        let counts = [Some(&rows), columns.as_ref()].map(|eyes| eyes.map(|eyes| eyes.points.len()));
+        let sight = Sight {
+            name: &ground.loaded.scene.name,
+            triangles: ground.mesh.indices.len(),
+            counts,
+            visible: done.found.as_ref().map(BitMatrix::count),
+            seconds: [ground.loaded.seconds, ground.build_seconds],
+        };
+        sight.end(self, bake, &done, || ground.tell(""))
+    }
 }
 
 /// Format of lines of sight.
@@ -185,123 +236,6 @@ pub fn warn_of_far(
     }
 }
 
-/// Runs the command, or merges parts of it.
-pub fn run(
-    args: &VisibleArgs,
-    memory: MemorySize,
-    parts: Option<&[PartFile]>,
-) -> Result<(), Failure> {
-    let isa = args.machine.isa()?;
-    if args.chunks.shard.is_none() {
-        check(args)?;
-    }
-    let bake = Bake {
-        scene: &args.scene,
-        outputs: &args.output,
-        json: args.json.as_ref(),
-        chunks: &args.chunks,
-        machine: &args.machine,
-        parts,
-        earth: args.curvature.then_some(Earth {
-            radius: args.earth_radius,
-            units: &args.units,
-            crs: args.raster.crs.as_ref(),
-            refraction: args.refraction,
-            up: args.up,
-        }),
-    };
-    let from = ("the points", Some(args.from.as_path()));
-    let to = ("the points", args.to.as_deref());
-    let world_files = map::world_files(&args.output)?;
-    let mut written = vec![("--lines", args.lines.as_deref())];
-    written.extend(
-        world_files
-            .iter()
-            .map(|path| ("the world file", Some(&**path))),
-    );
-    let mut files = bake.declare(&written, &[from, to])?;
-    if viewshed::is_of_cells(args) {
-        return viewshed::run(args, &bake, files, isa, memory);
-    }
-    let ground = bake.ground(isa, memory, &mut files)?;
-    let up = ground.up(args.up)?;
-    let site = asked(args).of(&ground.loaded, up)?;
-    let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
-    let points = Points::read(args, &ground, &plan)?;
-    points.warn_of_far_ones(args, &ground.bvh.bounds(), ground.local);
-    let (rows, columns) = points.eyes(args, &ground, &plan);
-    let job = VisibilityJob {
-        rows: &rows,
-        columns: columns.as_ref(),
-        margin: args.margin.map(|margin| margin as f32),
-        range: args.radius.map(|radius| (radius, plan.up)),
-    };
-    let done = bake.compute(&job, &ground, &ground.bvh)?;
-    let counts = [
-        rows.points.len(),
-        columns.as_ref().unwrap_or(&rows).points.len(),
-    ];
-    let [from, to] = match args.viewshed {
-        true => [counts[1], counts[0]],
-        false => counts,
-    };
-    let mut document = Document {
-        head: bake.head("antumbra.visible/1", isa, &ground.loaded.scene.name),
-        outputs: bake.output_names(),
-        lines: args.lines.as_deref().map(text),
-        shard: bake.shard(),
-        triangles: ground.mesh.indices.len(),
-        from,
-        to,
-        viewshed: args.viewshed,
-        pairs: match columns {
-            Some(_) => from as u64 * to as u64,
-            // No point is paired with itself.
-            None => from as u64 * (from as u64).saturating_sub(1),
-        },
-        visible_pairs: None,
-        visible_share: None,
-        load_seconds: ground.loaded.seconds,
-        build_seconds: ground.build_seconds,
-        trace_seconds: done.seconds,
-    };
-    let Some(matrix) = done.found else {
-        json::write(&document, args.json.as_ref())?;
-        let outputs = document.outputs.join(", ");
-        tell(format_args!("wrote {outputs}, for merge"));
-        return Ok(());
-    };
-    let points = points.unbent(&ground);
-    let grid = Plan {
-        ground: &ground,
-        bvh: &ground.bvh,
-        orientation: &plan,
-        up,
-        cell: args.grid.unwrap_or_default(),
-        north: Some(site.map_or(0.0, |site| site.north)),
-        metres: args.units.known(),
-    };
-    write(args, &grid, &points, &matrix)?;
-    if let Some(path) = &args.lines {
-        let _writing = interrupt::writing();
-        let ends = Ends {
-            rows: &rows.points,
-            columns: columns.as_ref().map(|eyes| &eyes.points[..]),
-            curvature: ground.curvature,
-            local: ground.local,
-            is_viewshed: args.viewshed,
-        };
-        lines(path, &ends, &matrix)?;
-    }
-    document.fill(matrix.count());
-    json::write(&document, args.json.as_ref())?;
-    ground.tell("");
-    document.tell();
-    bake.tell_done("pairs", document.pairs, document.trace_seconds);
-    chunks::forget(done.checkpoint.as_deref());
-    Ok(())
-}
-
 /// Flags that a coordinate system may answer.
 pub fn asked(args: &VisibleArgs) -> Asked<'_> {
     Asked {
@@ -318,63 +252,54 @@ fn write(
     points: &Points,
     matrix: &BitMatrix,
 ) -> Result<(), Failure> {
-    let _writing = interrupt::writing();
-    let ground = plan.ground;
+    let (ground, local) = (plan.ground, plan.ground.local);
     let counts = matrix.count_rows();
-    let values = || counts.iter().map(|&count| count as f32).collect::<Vec<_>>();
-    let name = if points.is_viewshed {
-        "seen_by"
-    } else {
-        "sees"
+    let values: Vec<f32> = counts.iter().map(|&count| count as f32).collect();
+    let name = match points.is_viewshed {
+        true => SEEN_BY.name,
+        false => "sees",
     };
-    let (rows, local) = (&points.rows, ground.local);
-    let each = |path: &PathBuf| match Format::of_sensors(path)? {
-        Format::Npz => {
-            let columns = points.columns.as_ref().unwrap_or(rows);
-            let places = [&rows.points[..], &columns.points];
-            npz(path, (points.is_viewshed, places, local), matrix, &counts)
-        }
-        Format::Csv => {
-            let labels = (&[][..], &rows.labels[..]);
-            files::table(path, (&rows.points, local), labels, (name, 40), |row| {
-                vec![counts[row] as f64]
-            })
-        }
-        Format::Raster => {
-            let quantity = Quantity { name, unit: "" };
-            let crs = (args.raster.crs.as_ref(), args.units.metres());
-            raster::write(path, ground, (rows, &values()), crs, (plan.up, quantity))
-        }
-        Format::Picture => {
-            let observers = points.columns.as_ref().unwrap_or(rows).points.len();
-            let unit = args
-                .units
-                .known()
-                .map(|metres| format!(" {}", unit_name(metres)));
-            let unit = unit.unwrap_or_default();
-            let words = Words {
-                title: format!("Viewshed, {}", ground.loaded.scene.name),
-                subtitle: format!(
-                    "{} observers, eyes {}{unit} and targets {}{unit} above their places",
-                    count(observers as u64),
-                    args.eye,
-                    args.target
-                ),
-                quantity: "Observers that see the place",
-                unit: "",
-                whole: true,
-                files: vec![&args.scene, &args.from],
-            };
-            let sheet = map::Sheet::new(&args.map, plan, rows)?;
-            sheet.write(path, &words, &values())
-        }
-        Format::Ply | Format::Glb => {
-            let mesh = (&ground.mesh, local);
-            let level = ([0.0; 3], args.map.colours());
-            files::coloured(path, (name, &values()), rows, mesh, level)
-        }
-    };
-    args.output.iter().try_for_each(each)
+    let rows = &points.rows;
+    let observers = points.columns.as_ref().unwrap_or(rows);
+    args.output
+        .iter()
+        .try_for_each(|path| match Format::of_sensors(path)? {
+            Format::Npz => {
+                let places = [&rows.points[..], &observers.points];
+                npz(path, (points.is_viewshed, places, local), matrix, &counts)
+            }
+            Format::Csv => {
+                let column = Column::new(name, |row| counts[row] as f64);
+                files::table(path, (rows, &[], local), &[], &[column])
+            }
+            Format::Raster => {
+                let quantity = Quantity { name, unit: "" };
+                let crs = (args.raster.crs.as_ref(), args.units.metres());
+                raster::write(path, ground, (rows, &values), crs, (plan.up, quantity))
+            }
+            Format::Picture => {
+                let unit = args.units.known().map(unit_name);
+                let unit = unit.map_or_else(String::new, |unit| format!(" {unit}"));
+                let words = Words {
+                    title: format!("Viewshed, {}", ground.loaded.scene.name),
+                    subtitle: format!(
+                        "{} observers, eyes {}{unit} and targets {}{unit} above their places",
+                        count(observers.points.len() as u64),
+                        args.eye,
+                        args.target
+                    ),
+                    quantity: "Observers that see the place",
+                    unit: "",
+                    whole: true,
+                    files: vec![&args.scene, &args.from],
+                };
+                map::Sheet::new(&args.map, plan, rows)?.write(path, &words, &values)
+            }
+            Format::Ply | Format::Glb => {
+                let level = ([0.0; 3], args.map.colours());
+                files::coloured(path, (name, &values), rows, (&ground.mesh, local), level)
+            }
+        })
 }
 
 /// Writes a matrix as arrays, with the places of its rows and columns.
@@ -462,20 +387,67 @@ pub fn lines(path: &Path, ends: &Ends<'_>, matrix: &BitMatrix) -> Result<(), Fai
     })?)
 }
 
-impl Document<'_> {
-    /// Fills in figures about the matrix.
-    pub fn fill(&mut self, visible: u64) {
-        self.visible_pairs = Some(visible);
-        self.visible_share = (self.pairs > 0).then(|| visible as f64 / self.pairs as f64);
-    }
+/// Figures about who sees what.
+pub struct Sight<'a> {
+    /// Name of the scene.
+    pub name: &'a str,
+    pub triangles: usize,
+    /// Numbers of points that have a row, and of those that have a column if these are others.
+    pub counts: [Option<usize>; 2],
+    /// Pairs that see each other.
+    pub visible: Option<u64>,
+    /// Seconds of loading and of building.
+    pub seconds: [f64; 2],
+}
 
-    pub fn tell(&self) {
-        let visible = self.visible_pairs.unwrap_or_default();
-        tell(format_args!(
-            "{} of {} pairs see each other ({:.1} %)",
-            count(visible),
-            count(self.pairs),
-            100.0 * visible as f64 / (self.pairs as f64).max(1.0),
-        ));
+impl Sight<'_> {
+    /// Writes the document, and says what was done: first of the scene by `tell_scene`.
+    pub fn end<T>(
+        &self,
+        args: &VisibleArgs,
+        bake: &Bake<'_>,
+        done: &Done<T>,
+        tell_scene: impl Fn(),
+    ) -> Result<(), Failure> {
+        let [rows, columns] = [self.counts[0], self.counts[1].or(self.counts[0])];
+        let [rows, columns] = [rows, columns].map(Option::unwrap_or_default);
+        let [from, to] = match args.viewshed {
+            true => [columns, rows],
+            false => [rows, columns],
+        };
+        let pairs = match self.counts[1] {
+            Some(_) => from as u64 * to as u64,
+            // No point is paired with itself.
+            None => from as u64 * (from as u64).saturating_sub(1),
+        };
+        let share = self.visible.filter(|_| pairs > 0);
+        let share = share.map(|visible| visible as f64 / pairs as f64);
+        let figures: &[Figure<'_>] = &[
+            ("outputs", &bake.output_names()),
+            ("lines", &args.lines.as_deref().map(text)),
+            ("shard", &bake.shard()),
+            ("triangles", &self.triangles),
+            ("from", &from),
+            ("to", &to),
+            ("viewshed", &args.viewshed),
+            ("pairs", &pairs),
+            ("visible_pairs", &self.visible),
+            ("visible_share", &share),
+            ("load_seconds", &self.seconds[0]),
+            ("build_seconds", &self.seconds[1]),
+            ("trace_seconds", &done.seconds),
+        ];
+        if bake.document(("antumbra.visible/1", self.name), figures, (done, ""))? {
+            tell_scene();
+            let visible = self.visible.unwrap_or_default();
+            tell(format_args!(
+                "{} of {} pairs see each other ({:.1} %)",
+                count(visible),
+                count(pairs),
+                100.0 * visible as f64 / (pairs as f64).max(1.0),
+            ));
+            bake.end("pairs", pairs, done);
+        }
+        Ok(())
     }
 }

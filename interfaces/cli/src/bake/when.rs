@@ -95,12 +95,7 @@ impl When {
         ground: &Ground,
         up: UpAxis,
     ) -> Result<(Self, Sunlight), Failure> {
-        let asked = Asked {
-            crs: args.raster.crs.as_ref(),
-            units: Some(&args.places.units),
-            north: Some(&args.places.north),
-        };
-        let site = asked.of(&ground.loaded, up)?;
+        let site = Asked::new(&args.raster, &args.places).of(&ground.loaded, up)?;
         let when = Self::new(args, weather, site)?;
         let steps = when.steps(args, weather)?;
         let sunlight = when.sunlight(args, steps, up)?;

@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 use clap::Parser;
 use serde::{Deserialize, Serialize};
 
-use crate::args::{Cli, Command, FarmArgs, FarmCommand, FarmJob};
-use crate::bake::{ao, factors, horizon, sun, visible};
+use crate::args::{Cli, Command, FarmArgs, FarmCommand, FarmJob, of_bake};
+use crate::bake::Baking as _;
 use crate::exit::Failure;
 use crate::output::{self, Files};
 use crate::render::check_image_names;
@@ -54,7 +54,7 @@ struct Plan {
 
 /// The command of plans that name none.
 fn render() -> String {
-    FarmJob::Render.name().to_owned()
+    FarmJob::Render.name()
 }
 
 impl Plan {
@@ -100,7 +100,7 @@ impl Plan {
         };
         Ok(Self {
             program: text(&program)?,
-            command: args.job.name().to_owned(),
+            command: args.job.name(),
             scene,
             output: absolute(output)?,
             more_outputs: more
@@ -211,7 +211,7 @@ fn check_bake(args: &FarmArgs) -> Result<(), Failure> {
         return Err(Failure::Usage(reason.into()));
     }
     let parse = |more: &[OsString]| {
-        let line = ["antumbra", args.job.name()].map(OsString::from);
+        let line = ["antumbra", &args.job.name()].map(OsString::from);
         let line = line.into_iter().chain([args.scene.clone().into()]);
         let line = line.chain(args.flags.iter().map(Into::into));
         let cli = Cli::try_parse_from(line.chain(more.iter().cloned()));
@@ -219,19 +219,11 @@ fn check_bake(args: &FarmArgs) -> Result<(), Failure> {
     };
     // As the tasks are, with flags that are ours to set.
     let task = ["-o", "0.part", "--shard", "0/1"].map(OsString::from);
-    let (outputs, json) = match parse(&task)?.command {
-        Some(Command::Ao(bake)) => (1, bake.json),
-        Some(Command::Sun(bake)) => (bake.output.len(), bake.json),
-        Some(Command::Visible(bake)) => (bake.output.len(), bake.json),
-        Some(Command::Horizon(bake)) => (bake.output.len(), bake.json),
-        Some(Command::Factors(bake)) => (bake.output.len(), bake.json),
-        _ => {
-            return Err(Failure::Usage(
-                "flags after -- belong to the command".into(),
-            ));
-        }
+    let Some(Command::Bake(bake)) = parse(&task)?.command else {
+        let reason = "flags after -- belong to the command";
+        return Err(Failure::Usage(reason.into()));
     };
-    if outputs != 1 || json.is_some() {
+    if of_bake!(bake, args => args.output.len() != 1 || args.json.is_some()) {
         let reason = "--output goes before --, and --json with `merge`";
         return Err(Failure::Usage(reason.into()));
     }
@@ -243,11 +235,7 @@ fn check_bake(args: &FarmArgs) -> Result<(), Failure> {
         whole.extend(["--lines".into(), path.clone().into_os_string()]);
     }
     match parse(&whole)?.command {
-        Some(Command::Ao(bake)) => ao::check(&bake).map(drop),
-        Some(Command::Sun(bake)) => sun::check(&bake),
-        Some(Command::Visible(bake)) => visible::check(&bake),
-        Some(Command::Horizon(bake)) => horizon::check(&bake),
-        Some(Command::Factors(bake)) => factors::check(&bake),
+        Some(Command::Bake(bake)) => of_bake!(bake, args => args.check()),
         _ => Ok(()),
     }
 }

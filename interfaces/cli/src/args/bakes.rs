@@ -1,0 +1,58 @@
+//! The commands that bake.
+
+use clap::Subcommand;
+
+use super::{AoArgs, FactorArgs, HorizonArgs, SunArgs, VisibleArgs};
+
+/// A command that bakes.
+#[derive(Debug, Subcommand)]
+pub enum BakeCommand {
+    /// Bake ambient occlusion: of vertices, a texture or a picture
+    ///
+    /// The value is the open part of the sky above a point: 1 where nothing is in the way, 0 where all is closed. Normals come
+    /// from the file. Without them, they are means of the triangles around a vertex, weighted by area, and vertices are
+    /// split where triangles meet at more than 40 degrees. So a corner of a roof has the open sky of the roof, and its copies
+    /// have what the walls see. The file has the same bytes for any number of threads and shards.
+    Ao(AoArgs),
+    /// Bake hours of direct sun, sky view factors and irradiation
+    ///
+    /// Each sensor traces a ray to every sun and every patch of the sky. Example, for a year in hours:
+    ///
+    /// antumbra sun city.ply --grid 2 --lat 48.2 --lon 16.4 --timezone 1 -o hours.csv -o hours.png
+    ///
+    /// Suns are where the algorithm of NREL has them. Light that surfaces reflect is left out.
+    #[command(override_usage = "antumbra sun [OPTIONS] -o <OUT> <SENSORS> <SCENE>")]
+    Sun(Box<SunArgs>),
+    /// Find which points see each other, and what observers see
+    ///
+    /// Points see each other if nothing lies between them. With --viewshed, the result is how many points of
+    /// A.csv see each place of the mesh.
+    Visible(VisibleArgs),
+    /// Find how high the horizon is in each direction
+    ///
+    /// The angle is the elevation in degrees from which on up to the zenith all of the sky is seen: 0 on an open plain, 90 below a
+    /// roof. Directions behind the surface of a sensor count as closed. Cells of a height raster (--cells) are computed exactly, from
+    /// its triangles in double precision. Otherwise rays find the angle to less than 0.001 degrees, and may miss surfaces that float
+    /// above others and are less than half a degree high.
+    #[command(override_usage = "antumbra horizon [OPTIONS] -o <OUT> <SENSORS> <SCENE>")]
+    Horizon(HorizonArgs),
+    /// Find how much of the light of a surface arrives at others
+    ///
+    /// View factors: the part of the light that leaves a surface evenly and arrives at each other one, or nowhere. Rows add up to
+    /// 1. Triangles emit on the side from which their corners run anticlockwise; both sides receive.
+    Factors(FactorArgs),
+}
+
+/// Does the same with the arguments of any bake. All have `scene`, `output`, `json`, `chunks` and `machine`.
+macro_rules! of_bake {
+    ($bake:expr, $args:ident => $what:expr) => {
+        match $bake {
+            $crate::args::BakeCommand::Ao($args) => $what,
+            $crate::args::BakeCommand::Sun($args) => $what,
+            $crate::args::BakeCommand::Visible($args) => $what,
+            $crate::args::BakeCommand::Horizon($args) => $what,
+            $crate::args::BakeCommand::Factors($args) => $what,
+        }
+    };
+}
+pub(crate) use of_bake;

@@ -1,0 +1,82 @@
+//! Height rasters that are baked without a mesh and without a tree.
+
+use std::path::Path;
+use std::time::Instant;
+
+use antumbra::LocalOrigin;
+use antumbra_bake::{HeightField, UpAxis};
+use antumbra_load::{Extent, Heights, MemorySize};
+use antumbra_raster::{Crs, Grid};
+
+use super::raster::is_raster;
+use super::site::Asked;
+use crate::exit::Failure;
+use crate::output::Files;
+use crate::scenes;
+
+/// A height raster.
+pub struct Terrain {
+    pub name: String,
+    pub heights: Heights,
+    pub extent: Extent,
+    pub load_seconds: f64,
+}
+
+/// Whether a scene is a height raster that lies as it does on a map.
+pub fn is_terrain(scene: &Path, up: Option<UpAxis>) -> bool {
+    is_raster(scene) && up.is_none_or(|up| up == UpAxis::Z)
+}
+
+impl Terrain {
+    /// Reads a raster.
+    pub fn load(scene: &Path, memory: MemorySize, files: &mut Files) -> Result<Self, Failure> {
+        let name = scene.file_stem().unwrap_or_default();
+        let name = name.to_string_lossy().into_owned();
+        let start = Instant::now();
+        let heights = scenes::load_heights(scene, memory)?;
+        files.reads_all(&heights.inputs)?;
+        let Some(extent) = heights.extent else {
+            return Err(Failure::scene(&name, "it has no cell with data"));
+        };
+        Ok(Self {
+            name,
+            heights,
+            extent,
+            load_seconds: start.elapsed().as_secs_f64(),
+        })
+    }
+
+    /// Settles what its coordinate system answers.
+    pub fn settle(&self, asked: &Asked<'_>) -> Result<(), Failure> {
+        let middle = self.extent.low.midpoint(self.extent.high).to_array();
+        let own = self.heights.raster.grid.crs.as_ref();
+        asked.settle(&self.name, own, middle).map(drop)
+    }
+
+    /// Its surface.
+    pub fn field(&self) -> Result<HeightField<'_>, Failure> {
+        let raster = &self.heights.raster;
+        let size = [raster.grid.width, raster.grid.height];
+        Ok(HeightField::new(
+            size,
+            &raster.values,
+            raster.grid.transform,
+        )?)
+    }
+
+    /// Origin of points in single precision.
+    pub fn local(&self) -> LocalOrigin {
+        LocalOrigin {
+            origin: self.extent.local_origin().to_array(),
+        }
+    }
+
+    /// Its grid, in the coordinate system that the command line says.
+    pub fn grid(&self, crs: Option<&Crs>) -> Grid {
+        let mut grid = self.heights.raster.grid.clone();
+        if crs.is_some() {
+            grid.crs = crs.cloned();
+        }
+        grid
+    }
+}
