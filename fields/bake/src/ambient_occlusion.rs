@@ -1,13 +1,12 @@
 //! Ambient occlusion: the open part of the sky above points.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use antumbra::{Bvh, Ray};
 use rayon::prelude::*;
 
 use crate::curve::OrderedPoints;
 use crate::directions::{Samples, key};
 use crate::memory;
+use crate::monitor::Progress;
 use crate::normals::unit;
 use crate::visibility::above;
 use crate::{Error, Monitor, Weighting};
@@ -195,7 +194,7 @@ fn bake<T: Copy + Send + Sync>(
     let OrderedPoints {
         points, normals, ..
     } = &places;
-    let done = AtomicUsize::new(0);
+    let progress = Progress::new(monitor, points.len());
     let blocks = values.par_chunks_mut(block).enumerate();
     blocks.try_for_each_init(
         || Worker::new(bvh, (options, &samples, wanted), monitor),
@@ -203,8 +202,7 @@ fn bake<T: Copy + Send + Sync>(
             let first = index * block;
             let range = first..first + values.len();
             worker.bake(&points[range.clone()], &normals[range], values, &finish)?;
-            let before = done.fetch_add(values.len(), Ordering::Relaxed);
-            monitor.progress(before + values.len(), points.len());
+            progress.add(values.len());
             Ok(())
         },
     )?;
@@ -218,13 +216,7 @@ pub(crate) fn check(
     normals: &[[f32; 3]],
     options: &AmbientOcclusion,
 ) -> Result<(), Error> {
-    if points.len() != normals.len() {
-        return Err(Error::Length {
-            what: "normals",
-            found: normals.len(),
-            wanted: points.len(),
-        });
-    }
+    Error::check_length("normals", normals.len(), points.len())?;
     if options.samples == 0 {
         return Err(Error::NoSamples);
     }
@@ -278,17 +270,13 @@ impl<'a> Worker<'a> {
     ) -> Result<(), Error> {
         self.found.clear();
         self.found.resize(2 * points.len(), Side::default());
-        let sides: &[f64] = if self.options.two_sided {
-            &[1.0, -1.0]
-        } else {
-            &[1.0]
-        };
+        let sides = if self.options.two_sided { 2 } else { 1 };
         for (index, (point, normal)) in points.iter().zip(normals).enumerate() {
             let Some(unit) = unit_normal(point, normal) else {
                 continue;
             };
             let key = key(self.options.seed, point, normal);
-            for (side, sign) in sides.iter().enumerate() {
+            for (side, sign) in [1.0, -1.0].iter().enumerate().take(sides) {
                 let place = 2 * index + side;
                 self.look(place, point, unit.map(|x| sign * x), key)?;
             }

@@ -53,13 +53,7 @@ impl BitMatrix {
     /// [`Error::Length`] if there are not `rows * columns.div_ceil(64)` words.
     pub fn from_words(rows: usize, columns: usize, words: Vec<u64>) -> Result<Self, Error> {
         let wanted = rows.saturating_mul(columns.div_ceil(64));
-        if words.len() != wanted {
-            return Err(Error::Length {
-                what: "words",
-                found: words.len(),
-                wanted,
-            });
-        }
+        Error::check_length("words", words.len(), wanted)?;
         let mut matrix = Self {
             rows,
             columns,
@@ -143,18 +137,10 @@ impl BitMatrix {
 
     /// Number of ones in every row.
     pub fn count_rows(&self) -> Vec<u64> {
-        let ones = |row| ones(self.row(row)).count() as u64;
-        match self.columns {
-            0..512 => (0..self.rows).map(ones).collect(),
-            _ => {
-                let rows = (0..self.rows).into_par_iter();
-                let count = |row| {
-                    let words = self.row(row).iter();
-                    words.map(|word| u64::from(word.count_ones())).sum()
-                };
-                rows.map(count).collect()
-            }
-        }
+        let rows = (0..self.rows).into_par_iter().with_min_len(1 << 8);
+        let ones = |word: &u64| u64::from(word.count_ones());
+        let count = |row| self.row(row).iter().map(ones).sum();
+        rows.map(count).collect()
     }
 
     /// Number of ones in every column.
@@ -174,13 +160,7 @@ impl BitMatrix {
     /// # Errors
     /// [`Error::Length`] if there is not one weight for each column.
     pub fn weighted_sums(&self, weights: &[f64]) -> Result<Vec<f64>, Error> {
-        if weights.len() != self.columns {
-            return Err(Error::Length {
-                what: "weights",
-                found: weights.len(),
-                wanted: self.columns,
-            });
-        }
+        Error::check_length("weights", weights.len(), self.columns)?;
         let rows = (0..self.rows).into_par_iter().with_min_len(64);
         let sum = |row| ones(self.row(row)).fold(0.0, |sum, column| sum + weights[column]);
         Ok(rows.map(sum).collect())
@@ -191,13 +171,7 @@ impl BitMatrix {
     /// # Errors
     /// [`Error::Length`] if the matrices differ in their columns, [`Error::TooLarge`] if there is no memory for both.
     pub fn append(&mut self, below: &Self) -> Result<(), Error> {
-        if below.columns != self.columns {
-            return Err(Error::Length {
-                what: "columns",
-                found: below.columns,
-                wanted: self.columns,
-            });
-        }
+        Error::check_length("columns", below.columns, self.columns)?;
         let rows = self.rows.saturating_add(below.rows);
         let reserved = self.words.try_reserve(below.words.len());
         reserved.map_err(|_| Error::TooLarge {

@@ -48,19 +48,13 @@ impl Curvature {
         centre: [f64; 3],
         orientation: Orientation,
     ) -> Result<Self, Error> {
-        let bad = |what, found, wanted| {
-            Err(Error::Range {
-                what,
-                found,
-                wanted,
-            })
-        };
-        if !(radius > 0.0 && radius.is_finite()) {
-            return bad("radius of the earth", radius, "a length above 0");
-        }
-        if !(-10.0..1.0).contains(&refraction) {
-            return bad("refraction", refraction, "a number from -10 to below 1");
-        }
+        let (is_length, what) = (radius > 0.0 && radius.is_finite(), "radius of the earth");
+        Error::check_range(what, radius, is_length, "a length above 0")?;
+        let (is_in, wanted) = (
+            (-10.0..1.0).contains(&refraction),
+            "a number from -10 to below 1",
+        );
+        Error::check_range("refraction", refraction, is_in, wanted)?;
         Ok(Self {
             factor: (1.0 - refraction) / (2.0 * radius),
             centre,

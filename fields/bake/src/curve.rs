@@ -1,6 +1,8 @@
 //! Points in an order in which neighbours are near each other: along a Morton curve. Rays of neighbouring points visit the same
 //! parts of the scene.
 
+use std::ops::Range;
+
 use antumbra::Aabb;
 use rayon::prelude::*;
 
@@ -83,12 +85,8 @@ impl OrderedPoints {
     /// # Errors
     /// [`Error::Length`] if there is another number of normals, or [`Error::NoMemory`].
     pub fn new(points: &[[f32; 3]], normals: &[[f32; 3]]) -> Result<Self, Error> {
-        if !normals.is_empty() && points.len() != normals.len() {
-            return Err(Error::Length {
-                what: "normals",
-                found: normals.len(),
-                wanted: points.len(),
-            });
+        if !normals.is_empty() {
+            Error::check_length("normals", normals.len(), points.len())?;
         }
         let order = along_curve(points)?;
         let sorted = |vectors: &[[f32; 3]]| {
@@ -103,6 +101,12 @@ impl OrderedPoints {
             normals: sorted(normals)?,
             order,
         })
+    }
+
+    /// Points and normals of some places.
+    pub fn at(&self, items: Range<usize>) -> [&[[f32; 3]]; 2] {
+        let normals = self.normals.get(items.clone()).unwrap_or_default();
+        [&self.points[items], normals]
     }
 
     /// Moves rows of `width` values from the order of the curve to the order of the list.

@@ -1,8 +1,9 @@
 //! Weather files of EnergyPlus (.epw): measured or typical sun and sky of a place, hour by hour.
 
-use crate::moment::Moment;
+use crate::moment::{Moment, days_since_1970};
 use crate::perez::Irradiance;
 use crate::sun::Place;
+use crate::table::{BadTable, fields};
 
 /// A weather file in EnergyPlus format (.epw).
 #[derive(Clone, Debug, PartialEq)]
@@ -31,32 +32,15 @@ pub struct Record {
 }
 
 /// Why a text is no weather file.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("line {line}: {reason}")]
-pub struct BadWeather {
-    /// Line of the file, from 1.
-    pub line: usize,
-    /// What is wrong with it.
-    pub reason: String,
-}
+pub type BadWeather = BadTable;
 
 /// Fields of a line of data that are read: direct normal and diffuse horizontal irradiance.
 const DIRECT: usize = 14;
 const DIFFUSE: usize = 15;
+/// Separator of fields.
+const COMMA: Option<char> = Some(',');
 /// From this value on, an irradiance is a mark for one that is missing.
 const MISSING: f64 = 9999.0;
-
-/// Fields of a line: between commas that are not in quotes, without quotes and blanks around them.
-fn fields(line: &str) -> Vec<&str> {
-    let mut is_quoted = false;
-    let ends = |c: char| {
-        is_quoted ^= c == '"';
-        c == ',' && !is_quoted
-    };
-    let fields = line.split(ends);
-    let bare = fields.map(|field| field.trim().trim_matches('"').trim());
-    bare.collect()
-}
 
 impl Weather {
     /// Reads a file. Irradiance that is missing counts as 0.
@@ -71,7 +55,7 @@ impl Weather {
             .map(|(index, line)| (index + 1, line));
         let bad = |line, reason: String| BadWeather { line, reason };
         let (_, first) = lines.next().unwrap_or((1, ""));
-        let found = fields(first.trim_start_matches('\u{feff}'));
+        let found = fields(first.trim_start_matches('\u{feff}'), COMMA);
         if !found[0].eq_ignore_ascii_case("LOCATION") || found.len() < 10 {
             let reason = "found no LOCATION with ten fields, as the first line of an .epw file has";
             return Err(bad(1, reason.into()));
@@ -107,7 +91,7 @@ impl Weather {
         };
         let mut periods = None;
         for (line, text) in lines {
-            let fields = fields(text);
+            let fields = fields(text, COMMA);
             if fields[0].eq_ignore_ascii_case("DATA PERIODS") {
                 let found = Periods::read(line, &fields).map_err(|reason| bad(line, reason))?;
                 periods = Some(found);
@@ -222,25 +206,16 @@ impl Day {
     fn days_to(&self, to: &Self) -> [i64; 2] {
         let place = |day: &Self| (day.month, day.day);
         let is_later = place(to) >= place(self);
-        let number = |day: &Self, year: i32| {
-            let moment = Moment {
-                year,
-                month: day.month,
-                day: day.day,
-                seconds: 0.0,
-            };
-            (moment.unix(0.0) / 86_400.0).round() as i64
-        };
+        let number = |day: &Self, year: i32| days_since_1970(year, day.month, day.day);
         if let (Some(first), Some(last)) = (self.year, to.year) {
             return [number(to, last) - number(self, first) + 1; 2];
         }
         let [first, last] = [2001, if is_later { 2001 } else { 2002 }];
         let days = number(to, last) - number(self, first) + 1;
         let [is_before, is_after] = [place(self) < (3, 1), place(to) >= (3, 1)];
-        let has_leap_day = if is_later {
-            is_before && is_after
-        } else {
-            is_before || is_after
+        let has_leap_day = match is_later {
+            true => is_before && is_after,
+            false => is_before || is_after,
         };
         [days, days + i64::from(has_leap_day)]
     }
@@ -271,11 +246,8 @@ impl Record {
         let (year, month, day) = (whole(0, "year")?, whole(1, "month")?, whole(2, "day")?);
         let (hour, minute) = (whole(3, "hour")?, whole(4, "minute")?);
         // Files for one record an hour have either 60 or 0 as its minute; the hour is that which ends.
-        let minute = if minute == 0 || per_hour == 1 {
-            60
-        } else {
-            minute
-        };
+        let is_end = minute == 0 || per_hour == 1;
+        let minute = if is_end { 60 } else { minute };
         let step = 60 / per_hour;
         let midnight = Moment::midnight(year as i32, month, day);
         let begin = midnight.filter(|_| (1..=24).contains(&hour) && minute <= 60 && minute >= step);
@@ -287,12 +259,9 @@ impl Record {
         begin.seconds = f64::from((hour - 1) * 3600 + (minute - step) * 60);
         let direct = number("direct normal irradiance", fields[DIRECT])?;
         let diffuse = number("diffuse horizontal irradiance", fields[DIFFUSE])?;
-        let known = |found: f64| {
-            if found >= MISSING {
-                0.0
-            } else {
-                found.max(0.0)
-            }
+        let known = |found: f64| match found >= MISSING {
+            true => 0.0,
+            false => found.max(0.0),
         };
         let record = Self {
             begin,

@@ -105,3 +105,35 @@ pub enum Error {
     #[error("cancelled")]
     Cancelled,
 }
+
+impl Error {
+    /// Refuses a list of another length than wanted.
+    pub(crate) fn check_length(
+        what: &'static str,
+        found: usize,
+        wanted: usize,
+    ) -> Result<(), Self> {
+        let is_right = found == wanted;
+        let error = Self::Length {
+            what,
+            found,
+            wanted,
+        };
+        is_right.then_some(()).ok_or(error)
+    }
+
+    /// Refuses a number that is not in its range.
+    pub(crate) fn check_range(
+        what: &'static str,
+        found: f64,
+        is_in: bool,
+        wanted: &'static str,
+    ) -> Result<(), Self> {
+        let error = Self::Range {
+            what,
+            found,
+            wanted,
+        };
+        is_in.then_some(()).ok_or(error)
+    }
+}

@@ -92,13 +92,7 @@ pub fn sun_hours(
     weights: &[f64],
     monitor: &dyn Monitor,
 ) -> Result<Vec<f64>, Error> {
-    if weights.len() != directions.len() {
-        return Err(Error::Length {
-            what: "weights",
-            found: weights.len(),
-            wanted: directions.len(),
-        });
-    }
+    Error::check_length("weights", weights.len(), directions.len())?;
     let rows = DirectionRows::new(bvh, points, normals, directions, f32::INFINITY)?;
     let mut values = memory::filled("values", points.len(), f64::NAN)?;
     fold_directions(&rows, monitor, (1, &mut values), &|_, seen, value| {

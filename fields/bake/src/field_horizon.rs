@@ -11,14 +11,13 @@
 //! Squares of [`BLOCK`] cells know their highest cell. A block is left out if that cell would be below the horizon so far.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use antumbra::Bvh;
-use rayon::prelude::*;
 
-use crate::horizon_angles::{angles, check_azimuths};
+use crate::horizon_angles::check_azimuths;
+use crate::job::{floats_of, in_pieces};
 use crate::orientation::sin_cos_degrees;
-use crate::{Error, HeightField, Job, Key, Monitor, Observer, memory};
+use crate::{Answers, Error, HeightField, Job, Key, Monitor, Observer, memory};
 
 /// Cells on a side of a block.
 const BLOCK: usize = 32;
@@ -294,31 +293,15 @@ impl Job for FieldHorizonJob<'_> {
         key.numbers(field.heights());
     }
 
-    fn answers(
-        &self,
-        _: &Bvh,
-        items: Range<usize>,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<u8>, Error> {
-        let total = items.len();
-        let done = AtomicUsize::new(0);
-        let pieces: Result<Vec<Vec<u8>>, Error> = self.observers[items]
-            .par_chunks(1 << 10)
-            .map(|observers| {
-                if monitor.cancelled() {
-                    return Err(Error::Cancelled);
-                }
-                let angles = observers.iter().flat_map(|observer| self.of(observer));
-                let bytes = angles.flat_map(f32::to_le_bytes).collect();
-                let before = done.fetch_add(observers.len(), Ordering::Relaxed);
-                monitor.progress(before + observers.len(), total);
-                Ok(bytes)
-            })
-            .collect();
-        Ok(pieces?.concat())
+    fn answers(&self, _: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers {
+        in_pieces(items, 1 << 10, monitor, |piece| {
+            let observers = self.observers[piece].iter();
+            let angles = observers.flat_map(|observer| self.of(observer));
+            Ok(angles.flat_map(f32::to_le_bytes).collect())
+        })
     }
 
     fn finish(&self, answers: &[Vec<u8>]) -> Result<Vec<f32>, Error> {
-        angles(answers, self.observers.len() * self.azimuths.len())
+        floats_of(answers, self.observers.len() * self.azimuths.len())
     }
 }

@@ -100,13 +100,7 @@ pub fn write_glb(mesh: &ShadedMesh<'_>, file: &mut dyn Write) -> io::Result<()> 
 
 /// Refuses meshes that a file cannot hold.
 fn check(mesh: &ShadedMesh<'_>) -> io::Result<()> {
-    let vertices = mesh.positions.len();
-    if mesh.normals.len() != vertices
-        || mesh.values.len() != vertices
-        || ![0, vertices].contains(&mesh.colours.len())
-        || ![0, vertices].contains(&mesh.bent_normals.len())
-        || mesh.indices.is_empty()
-    {
+    if !mesh.is_whole() || mesh.indices.is_empty() {
         return Err(invalid("a mesh that a .glb file cannot hold"));
     }
     if !mesh.positions.as_flattened().iter().all(|x| x.is_finite()) {

@@ -44,28 +44,12 @@ impl<'a> HeightField<'a> {
     ) -> Result<Self, Error> {
         let [_, a, b, _, d, e] = transform;
         let area = (a * e - b * d).abs();
-        if !(area > 0.0 && area.is_finite()) {
-            return Err(Error::Range {
-                what: "area of a cell",
-                found: area,
-                wanted: "a number above 0",
-            });
-        }
+        let is_in = area > 0.0 && area.is_finite();
+        Error::check_range("area of a cell", area, is_in, "a number above 0")?;
         let cells = width.saturating_mul(height);
-        if heights.len() != cells {
-            return Err(Error::Length {
-                what: "heights",
-                found: heights.len(),
-                wanted: cells,
-            });
-        }
-        if cells == 0 || cells > u32::MAX as usize {
-            return Err(Error::Range {
-                what: "number of cells",
-                found: cells as f64,
-                wanted: "1 to 4294967295",
-            });
-        }
+        Error::check_length("heights", heights.len(), cells)?;
+        let is_in = (1..=u32::MAX as usize).contains(&cells);
+        Error::check_range("number of cells", cells as f64, is_in, "1 to 4294967295")?;
         let mut columns = memory::room("heights", heights.len())?;
         columns.resize(heights.len(), 0.0);
         for top in (0..height).step_by(TILE) {

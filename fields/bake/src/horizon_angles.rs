@@ -6,10 +6,11 @@ use antumbra::{Bvh, Ray};
 use rayon::prelude::*;
 
 use crate::curve::OrderedPoints;
+use crate::job::floats_of;
 use crate::normals::unit;
 use crate::orientation::dot;
 use crate::visibility::above;
-use crate::{Error, Job, Key, Monitor, Orientation, memory, sees_directions};
+use crate::{Answers, Error, Job, Key, Monitor, Orientation, memory, sees_directions};
 
 /// Degrees between the rays that look for the highest surface.
 const SCAN: f64 = 0.5;
@@ -133,25 +134,9 @@ impl HorizonJob {
 
 /// Refuses azimuths that are not finite.
 pub(crate) fn check_azimuths(azimuths: &[f64]) -> Result<(), Error> {
-    match azimuths.iter().find(|azimuth| !azimuth.is_finite()) {
-        Some(&found) => Err(Error::Range {
-            what: "azimuth",
-            found,
-            wanted: "a finite angle in degrees",
-        }),
-        None => Ok(()),
-    }
-}
-
-/// Angles from the answers of a job.
-pub(crate) fn angles(answers: &[Vec<u8>], count: usize) -> Result<Vec<f32>, Error> {
-    let mut angles = memory::room("angles", count)?;
-    let numbers = answers.iter().flat_map(|bytes| bytes.as_chunks::<4>().0);
-    angles.extend(numbers.map(|bytes| f32::from_le_bytes(*bytes)));
-    match angles.len() == count {
-        true => Ok(angles),
-        false => Err(Error::Answers),
-    }
+    let wanted = "a finite angle in degrees";
+    let mut azimuths = azimuths.iter();
+    azimuths.try_for_each(|&x| Error::check_range("azimuth", x, x.is_finite(), wanted))
 }
 
 impl Job for HorizonJob {
@@ -178,18 +163,8 @@ impl Job for HorizonJob {
         }
     }
 
-    fn answers(
-        &self,
-        bvh: &Bvh,
-        items: Range<usize>,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<u8>, Error> {
-        let normals = match self.places.normals.is_empty() {
-            true => &[],
-            false => &self.places.normals[items.clone()],
-        };
-        let points = &self.places.points[items.clone()];
-        let far = f32::INFINITY;
+    fn answers(&self, bvh: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers {
+        let ([points, normals], far) = (self.places.at(items.clone()), f32::INFINITY);
         let seen = sees_directions(bvh, points, normals, &self.scan, far, monitor)?;
         let of_item = |index: usize| {
             let item = items.start + index;
@@ -215,7 +190,7 @@ impl Job for HorizonJob {
 
     fn finish(&self, answers: &[Vec<u8>]) -> Result<Vec<f32>, Error> {
         let count = self.places.points.len() * self.azimuths.len();
-        let mut found = angles(answers, count)?;
+        let mut found = floats_of(answers, count)?;
         if !self.azimuths.is_empty() {
             self.places.put_back(self.azimuths.len(), &mut found);
         }

@@ -3,9 +3,14 @@
 use std::ops::Range;
 
 use antumbra::{Bvh, Ray};
+use rayon::prelude::*;
 use xxhash_rust::xxh3::Xxh3;
 
+use crate::monitor::Progress;
 use crate::{Error, Monitor, memory};
+
+/// Answers of some items of a [`Job`], as bytes.
+pub type Answers = Result<Vec<u8>, Error>;
 
 /// A bake of numbered items, such as points.
 ///
@@ -34,12 +39,7 @@ pub trait Job: Sync {
     ///
     /// # Errors
     /// [`Error`] if the job makes no sense, or if `monitor` cancels.
-    fn answers(
-        &self,
-        bvh: &Bvh,
-        items: Range<usize>,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<u8>, Error>;
+    fn answers(&self, bvh: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers;
 
     /// Result of the answers of all items, which may come in pieces.
     ///
@@ -52,6 +52,28 @@ pub trait Job: Sync {
         let _ = (bvh, count, per_item);
         Vec::new()
     }
+}
+
+/// Answers that all threads compute: `of` computes the answers of a piece of so many items.
+pub(crate) fn in_pieces(
+    items: Range<usize>,
+    each: usize,
+    monitor: &dyn Monitor,
+    of: impl Fn(Range<usize>) -> Answers + Sync,
+) -> Answers {
+    let progress = Progress::new(monitor, items.len());
+    let firsts: Vec<usize> = items.clone().step_by(each).collect();
+    let pieces = firsts.into_par_iter().map(|first| {
+        if monitor.cancelled() {
+            return Err(Error::Cancelled);
+        }
+        let piece = first..(first + each).min(items.end);
+        let number = piece.len();
+        let answers = of(piece)?;
+        progress.add(number);
+        Ok(answers)
+    });
+    Ok(pieces.collect::<Result<Vec<_>, Error>>()?.concat())
 }
 
 /// Computes a job as a whole.
@@ -83,24 +105,18 @@ impl Key {
 
     /// Adds the length of the list and the bits of its numbers.
     pub fn vectors(&mut self, vectors: &[[f32; 3]]) {
-        let numbers = vectors.as_flattened();
-        self.0.update(&(numbers.len() as u64).to_le_bytes());
-        let mut bytes = Vec::with_capacity(4 * numbers.len().min(1 << 12));
-        for piece in numbers.chunks(1 << 12) {
-            bytes.clear();
-            let number = |x: &f32| bytes.extend(x.to_bits().to_le_bytes());
-            piece.iter().for_each(number);
-            self.0.update(&bytes);
-        }
+        self.list(vectors.as_flattened(), |x| x.to_bits().to_le_bytes());
     }
 
     /// Adds the length of the list and the bits of its numbers.
     pub fn numbers(&mut self, numbers: &[f64]) {
+        self.list(numbers, |x| x.to_bits().to_le_bytes());
+    }
+
+    fn list<T, const N: usize>(&mut self, numbers: &[T], bytes: fn(&T) -> [u8; N]) {
         self.0.update(&(numbers.len() as u64).to_le_bytes());
-        let mut bytes = Vec::with_capacity(8 * numbers.len().min(1 << 12));
         for piece in numbers.chunks(1 << 12) {
-            bytes.clear();
-            bytes.extend(piece.iter().flat_map(|x| x.to_bits().to_le_bytes()));
+            let bytes: Vec<u8> = piece.iter().flat_map(bytes).collect();
             self.0.update(&bytes);
         }
     }
@@ -129,4 +145,13 @@ pub(crate) fn words_of(answers: &[Vec<u8>]) -> Result<Vec<u64>, Error> {
     let words = answers.iter().flat_map(|bytes| bytes.as_chunks::<8>().0);
     all.extend(words.map(|word| u64::from_le_bytes(*word)));
     Ok(all)
+}
+
+/// Numbers of answers, which are so many.
+pub(crate) fn floats_of(answers: &[Vec<u8>], count: usize) -> Result<Vec<f32>, Error> {
+    let mut all = memory::room("numbers of answers", count)?;
+    let numbers = answers.iter().flat_map(|bytes| bytes.as_chunks::<4>().0);
+    all.extend(numbers.map(|bytes| f32::from_le_bytes(*bytes)));
+    let is_all = all.len() == count;
+    is_all.then_some(all).ok_or(Error::Answers)
 }

@@ -156,7 +156,7 @@ pub use groups::{Groups, Statistics};
 pub use height_field::HeightField;
 pub use horizon_angles::HorizonJob;
 pub use hourly::{Hourly, Receipt};
-pub use job::{Job, Key, run};
+pub use job::{Answers, Job, Key, run};
 pub use learn::{Learned, learn_when_it_pays};
 pub use measures::SunlightClass;
 pub use mesh::Mesh;

@@ -48,13 +48,11 @@ impl Sunlight {
     /// # Errors
     /// [`Error::Range`] if the angle is not from 0 to 90.
     pub fn above(mut self, elevation: f64) -> Result<Self, Error> {
-        if !(0.0..=90.0).contains(&elevation) {
-            return Err(Error::Range {
-                what: "elevation",
-                found: elevation,
-                wanted: "an angle from 0 to 90 degrees",
-            });
-        }
+        let (is_in, wanted) = (
+            (0.0..=90.0).contains(&elevation),
+            "an angle from 0 to 90 degrees",
+        );
+        Error::check_range("elevation", elevation, is_in, wanted)?;
         let suns = &mut self.suns;
         let high: Vec<bool> = (suns.positions.iter())
             .map(|sun| sun.elevation >= elevation)

@@ -79,7 +79,7 @@ fn days_of_month(year: i32, month: u32) -> u32 {
 }
 
 /// Days from 1970-01-01 to a date. Years are counted from March, so that the odd day comes last in them.
-fn days_since_1970(year: i32, month: u32, day: u32) -> i64 {
+pub(crate) fn days_since_1970(year: i32, month: u32, day: u32) -> i64 {
     let year = i64::from(year) - i64::from(month < 3);
     // Days before each month from March: 31 and 30 in turn make 153 in five months.
     let before = (153 * i64::from((month + 9) % 12) + 2) / 5;
@@ -87,24 +87,17 @@ fn days_since_1970(year: i32, month: u32, day: u32) -> i64 {
     365 * year + leap_days + before + i64::from(day) - 719_469
 }
 
-/// Date so many days after 1970-01-01.
+/// Date so many days after 1970-01-01. Dates beyond the range of years end at its ends.
 fn date(days: i64) -> (i32, u32, u32) {
-    // A guess that is right or one year late; dates beyond the range of years end at its ends.
-    let mut year = (1970 + days.div_euclid(365).clamp(-3_000_000, 3_000_000)) as i32;
-    while days < days_since_1970(year, 1, 1) {
-        let late = days_since_1970(year, 1, 1) - days;
-        year -= (late / 366).max(1) as i32;
-    }
-    while days >= days_since_1970(year + 1, 1, 1) {
-        year += 1;
-    }
-    let mut left = days - days_since_1970(year, 1, 1);
-    let mut month = 1;
-    while left >= i64::from(days_of_month(year, month)) && month < 12 {
-        left -= i64::from(days_of_month(year, month));
-        month += 1;
-    }
-    (year, month, left.min(30) as u32 + 1)
+    let days = days.clamp(-1_100_000_000, 1_100_000_000) + 719_468;
+    // Years from March of each 400 years, and days of them.
+    let (era, day) = (days.div_euclid(146_097), days.rem_euclid(146_097));
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    let month = (5 * day + 2) / 153;
+    let day = day - (153 * month + 2) / 5 + 1;
+    let year = 400 * era + year + i64::from(month >= 10);
+    (year as i32, ((month + 2) % 12 + 1) as u32, day as u32)
 }
 
 impl FromStr for Moment {
@@ -147,12 +140,8 @@ impl FromStr for Moment {
 impl fmt::Display for Moment {
     /// Writes `YYYY-MM-DDTHH:MM:SS`, with the seconds rounded down.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (
-            seconds,
-            Self {
-                year, month, day, ..
-            },
-        ) = (self.seconds as u32, self);
+        let (year, month, day) = (self.year, self.month, self.day);
+        let seconds = self.seconds as u32;
         let [hour, minute, second] = [seconds / 3600, seconds / 60 % 60, seconds % 60];
         write!(
             f,

@@ -1,5 +1,7 @@
 //! Progress and cancellation.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 /// Watches work that takes long. Called from any thread, many times a second.
 ///
 /// `()` watches nothing, and cancels nothing.
@@ -16,3 +18,22 @@ pub trait Monitor: Sync {
 }
 
 impl Monitor for () {}
+
+/// Counts the items that are done for a monitor.
+pub(crate) struct Progress<'a> {
+    monitor: &'a dyn Monitor,
+    done: AtomicUsize,
+    of: usize,
+}
+
+impl<'a> Progress<'a> {
+    pub fn new(monitor: &'a dyn Monitor, of: usize) -> Self {
+        let done = AtomicUsize::new(0);
+        Self { monitor, done, of }
+    }
+
+    pub fn add(&self, items: usize) {
+        let before = self.done.fetch_add(items, Ordering::Relaxed);
+        self.monitor.progress(before + items, self.of);
+    }
+}

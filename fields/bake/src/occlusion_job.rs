@@ -6,8 +6,10 @@ use antumbra::{Bvh, Ray};
 
 use crate::ambient_occlusion::check;
 use crate::curve::OrderedPoints;
+use crate::job::floats_of;
 use crate::{
-    AmbientOcclusion, Error, Job, Key, Monitor, ambient_occlusion, ambient_rays, bent_normals,
+    AmbientOcclusion, Answers, Error, Job, Key, Monitor, ambient_occlusion, ambient_rays,
+    bent_normals,
 };
 
 /// Job of [`ambient_occlusion`], or of [`bent_normals`].
@@ -74,16 +76,8 @@ impl Job for OcclusionJob {
         }
     }
 
-    fn answers(
-        &self,
-        bvh: &Bvh,
-        items: Range<usize>,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<u8>, Error> {
-        let OrderedPoints {
-            points, normals, ..
-        } = &self.places;
-        let (points, normals) = (&points[items.clone()], &normals[items]);
+    fn answers(&self, bvh: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers {
+        let [points, normals] = self.places.at(items);
         if self.bent_normals {
             let found = bent_normals(bvh, points, normals, &self.options, monitor)?;
             let numbers = found.iter().flat_map(|point| {
@@ -97,12 +91,8 @@ impl Job for OcclusionJob {
     }
 
     fn finish(&self, answers: &[Vec<u8>]) -> Result<Openness, Error> {
-        let bytes = answers.iter().flat_map(|bytes| bytes.as_chunks::<4>().0);
-        let mut numbers: Vec<f32> = bytes.map(|bytes| f32::from_le_bytes(*bytes)).collect();
         let width = if self.bent_normals { 4 } else { 1 };
-        if numbers.len() != width * self.places.points.len() {
-            return Err(Error::Answers);
-        }
+        let mut numbers = floats_of(answers, width * self.items())?;
         self.places.put_back(width, &mut numbers);
         if !self.bent_normals {
             return Ok(Openness {

@@ -42,13 +42,8 @@ impl Orientation {
     /// # Errors
     /// [`Error::Range`] if the angle is not finite.
     pub fn new(up: UpAxis, north: f64) -> Result<Self, Error> {
-        if !north.is_finite() {
-            return Err(Error::Range {
-                what: "north",
-                found: north,
-                wanted: "a finite angle in degrees",
-            });
-        }
+        let wanted = "a finite angle in degrees";
+        Error::check_range("north", north, north.is_finite(), wanted)?;
         let (up, own_north) = match up {
             UpAxis::Y => ([0.0, 1.0, 0.0], [0.0, 0.0, -1.0]),
             UpAxis::Z => ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0]),

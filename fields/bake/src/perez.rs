@@ -110,14 +110,9 @@ pub fn perez_sky(
         ("elevation of the sun", sun.elevation + 90.0),
         ("azimuth of the sun", sun.azimuth.abs()),
     ] {
-        if !(found >= 0.0 && found.is_finite()) {
-            let wanted = "a finite number, and no irradiance below 0";
-            return Err(Error::Range {
-                what,
-                found,
-                wanted,
-            });
-        }
+        let is_in = found >= 0.0 && found.is_finite();
+        let wanted = "a finite number, and no irradiance below 0";
+        Error::check_range(what, found, is_in, wanted)?;
     }
     if diffuse_horizontal == 0.0 || patches.is_empty() {
         return Ok(vec![0.0; patches.len()]);

@@ -51,13 +51,9 @@ impl Sensors {
     ) -> Result<Self, Error> {
         let lengths = [Some(placement.spacing), placement.storey];
         for found in lengths.into_iter().flatten() {
-            if !(found > 0.0) || !placement.offset.is_finite() {
-                return Err(Error::Range {
-                    what: "spacing, storey or offset",
-                    found,
-                    wanted: "a length above 0, and a finite offset",
-                });
-            }
+            let is_in = found > 0.0 && placement.offset.is_finite();
+            let wanted = "a length above 0, and a finite offset";
+            Error::check_range("spacing, storey or offset", found, is_in, wanted)?;
         }
         let of_kind = |kind| placement.kinds.contains(&kind);
         let mut places: Vec<([f64; 3], u32)> = Vec::new();
@@ -124,13 +120,7 @@ impl Sensors {
     /// [`Error::Range`] if the spacing is not above 0, [`Error::Cells`] if a line has more than 100 million sensors, or
     /// [`Error::NoSurface`] if no line is long enough.
     pub fn along_lines(corners: &Self, spacing: f64) -> Result<Self, Error> {
-        if !(spacing > 0.0) {
-            return Err(Error::Range {
-                what: "spacing",
-                found: spacing,
-                wanted: "a length above 0",
-            });
-        }
+        Error::check_range("spacing", spacing, spacing > 0.0, "a length above 0")?;
         let mut sensors = Self::default();
         let names = corners.labels.first();
         let mut all_names = Vec::new();

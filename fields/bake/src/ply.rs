@@ -25,6 +25,14 @@ pub struct ShadedMesh<'a> {
 }
 
 impl ShadedMesh<'_> {
+    /// Whether all lists have the length that they should have.
+    pub(crate) fn is_whole(&self) -> bool {
+        let vertices = self.positions.len();
+        [self.normals.len(), self.values.len()] == [vertices; 2]
+            && [0, vertices].contains(&self.colours.len())
+            && [0, vertices].contains(&self.bent_normals.len())
+    }
+
     fn is_local(&self) -> bool {
         self.local != LocalOrigin::default()
     }
@@ -50,10 +58,7 @@ impl ShadedMesh<'_> {
     pub fn write(&self, name: &str, file: &mut dyn Write) -> io::Result<()> {
         let vertices = self.positions.len();
         let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
-        if self.normals.len() != vertices
-            || self.values.len() != vertices
-            || ![0, vertices].contains(&self.colours.len())
-            || ![0, vertices].contains(&self.bent_normals.len())
+        if !self.is_whole()
             || vertices > i32::MAX as usize
             || name.is_empty()
             || !name.chars().all(is_word)

@@ -121,13 +121,7 @@ impl Sensors {
         spacing: f64,
         orientation: &Orientation,
     ) -> Result<Self, Error> {
-        if !(spacing > 0.0) {
-            return Err(Error::Range {
-                what: "spacing",
-                found: spacing,
-                wanted: "a length above 0",
-            });
-        }
+        Error::check_range("spacing", spacing, spacing > 0.0, "a length above 0")?;
         let bounds = bvh.bounds();
         let (low, high) = extent(orientation, bounds.min, bounds.max);
         let size = [0, 1].map(|axis| ((high[axis] - low[axis]) / spacing).ceil().max(1.0));
@@ -191,6 +185,12 @@ impl Sensors {
         Ok(sensors)
     }
 
+    /// Texts of a label.
+    pub fn label(&self, column: &str) -> Option<&[String]> {
+        let label = self.labels.iter().find(|label| label.column == column);
+        label.map(|label| &label.values[..])
+    }
+
     /// Puts points without a height on the surface that is seen from above. A height that is missing is NaN, as
     /// [`Sensors::from_table`] leaves it.
     ///
@@ -240,13 +240,7 @@ impl Sensors {
 fn extent(orientation: &Orientation, min: [f32; 3], max: [f32; 3]) -> ([f64; 3], [f64; 3]) {
     let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     for corner in 0..8 {
-        let at = |axis: usize| {
-            if corner >> axis & 1 == 0 {
-                min[axis]
-            } else {
-                max[axis]
-            }
-        };
+        let at = |axis: usize| [min, max][corner >> axis & 1][axis];
         let place = orientation.local([0, 1, 2].map(|axis| f64::from(at(axis))));
         for axis in 0..3 {
             low[axis] = low[axis].min(place[axis]);

@@ -43,13 +43,9 @@ impl SkyDivision {
             Self::Reinhart(parts) => (parts, 80),
             Self::Uniform(count) => (count, MOST),
         };
-        if found == 0 || found > most {
-            return Err(Error::Range {
-                what: "patches",
-                found: f64::from(found),
-                wanted: "1 to 80 parts of each patch, or 1 to 1048576 patches",
-            });
-        }
+        let is_in = (1..=most).contains(&found);
+        let wanted = "1 to 80 parts of each patch, or 1 to 1048576 patches";
+        Error::check_range("patches", found.into(), is_in, wanted)?;
         Ok(match self {
             Self::Reinhart(parts) => rows(parts),
             _ => spiral(found),

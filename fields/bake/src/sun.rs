@@ -103,15 +103,7 @@ pub fn sun_positions(
 }
 
 fn within(what: &'static str, found: f64, most: f64, wanted: &'static str) -> Result<f64, Error> {
-    if found.abs() <= most {
-        Ok(found)
-    } else {
-        Err(Error::Range {
-            what,
-            found,
-            wanted,
-        })
-    }
+    Error::check_range(what, found, found.abs() <= most, wanted).map(|()| found)
 }
 
 #[cfg(test)]

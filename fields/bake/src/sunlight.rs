@@ -10,8 +10,9 @@ use crate::job::{bytes_of, words_of};
 use crate::memory;
 use crate::orientation::dot;
 use crate::{
-    BitMatrix, Clock, Error, Irradiance, Job, Key, Moment, Monitor, Orientation, Place, Refraction,
-    SkyPatches, SunPosition, Weather, Weighting, ones, perez_sky, sees_directions, sun_positions,
+    Answers, BitMatrix, Clock, Error, Irradiance, Job, Key, Moment, Monitor, Orientation, Place,
+    Refraction, SkyPatches, SunPosition, Weather, Weighting, ones, perez_sky, sees_directions,
+    sun_positions,
 };
 
 /// Most steps of time.
@@ -452,17 +453,8 @@ impl Job for SunJob<'_> {
         }
     }
 
-    fn answers(
-        &self,
-        bvh: &Bvh,
-        items: Range<usize>,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<u8>, Error> {
-        let normals = match self.places.normals.is_empty() {
-            true => &[],
-            false => &self.places.normals[items.clone()],
-        };
-        let (points, far) = (&self.places.points[items], f32::INFINITY);
+    fn answers(&self, bvh: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers {
+        let ([points, normals], far) = (self.places.at(items), f32::INFINITY);
         let seen = sees_directions(bvh, points, normals, &self.directions, far, monitor)?;
         bytes_of(seen.words())
     }

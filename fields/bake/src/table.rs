@@ -4,7 +4,7 @@ use antumbra::LocalOrigin;
 
 use crate::{Label, Sensors};
 
-/// Why a text is no table of points.
+/// Why a text is no table of points, or no weather file.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("line {line}: {reason}")]
 pub struct BadTable {
@@ -106,7 +106,7 @@ fn bad(line: usize, reason: String) -> BadTable {
 }
 
 /// Fields of a line, between marks or else spaces. Marks inside of quotation marks belong to the field.
-fn fields(line: &str, mark: Option<char>) -> Vec<&str> {
+pub(crate) fn fields(line: &str, mark: Option<char>) -> Vec<&str> {
     let mut is_quoted = false;
     let is_end = |c: char| {
         is_quoted ^= c == '"';

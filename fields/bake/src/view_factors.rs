@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use crate::job::{bytes_of, words_of};
 use crate::normals::{cross, unit};
 use crate::visibility::moved;
-use crate::{Error, Job, Key, Monitor, memory, run};
+use crate::{Answers, Error, Job, Key, Monitor, memory, run};
 
 /// Rays that a thread traces together.
 const RAYS: usize = 1 << 12;
@@ -125,12 +125,7 @@ impl Job for ViewFactorJob<'_> {
         }
     }
 
-    fn answers(
-        &self,
-        bvh: &Bvh,
-        items: Range<usize>,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<u8>, Error> {
+    fn answers(&self, bvh: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers {
         let total = items.len();
         let mut words = memory::room("view factors", total * self.width())?;
         for (done, surface) in items.enumerate() {

@@ -1,15 +1,15 @@
 //! Viewsheds of height fields: the cells that observers see, exactly and without rays.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use antumbra::Bvh;
 use rayon::prelude::*;
 
 use crate::height_field::{HeightField, Side};
+use crate::job::in_pieces;
 use crate::orientation::dot;
 use crate::sweep::{SECTORS, Sector};
-use crate::{BitMatrix, Error, Job, Key, Monitor, memory};
+use crate::{Answers, BitMatrix, Error, Job, Key, Monitor, memory};
 
 /// An observer on a height field.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -157,27 +157,10 @@ impl Job for ViewshedJob<'_> {
         key.numbers(self.field.heights());
     }
 
-    fn answers(
-        &self,
-        _: &Bvh,
-        items: Range<usize>,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<u8>, Error> {
-        let total = items.len();
-        let done = AtomicUsize::new(0);
-        let found: Result<Vec<Vec<u8>>, Error> = items
-            .into_par_iter()
-            .map(|item| {
-                if monitor.cancelled() {
-                    return Err(Error::Cancelled);
-                }
-                let runs = self.runs(&self.observers[item]);
-                let before = done.fetch_add(1, Ordering::Relaxed);
-                monitor.progress(before + 1, total);
-                runs
-            })
-            .collect();
-        Ok(found?.concat())
+    fn answers(&self, _: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers {
+        in_pieces(items, 1, monitor, |item| {
+            self.runs(&self.observers[item.start])
+        })
     }
 
     fn finish(&self, answers: &[Vec<u8>]) -> Result<Viewsheds, Error> {

@@ -1,7 +1,6 @@
 //! What points see: directions of the sky or the sun, and other points.
 
 use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use antumbra::{Aabb, Bvh, Directions, LocalOrigin, Ray, RayOrder};
 use rayon::prelude::*;
@@ -9,6 +8,7 @@ use rayon::prelude::*;
 use crate::bits::BitMatrix;
 use crate::curve::{OrderedPoints, along_curve};
 use crate::memory;
+use crate::monitor::Progress;
 use crate::normals::unit;
 use crate::orientation::dot;
 use crate::{Error, Monitor};
@@ -248,14 +248,9 @@ impl<'a> SightLines<'a> {
     /// # Errors
     /// [`Error::Range`] if the margin is negative or not finite.
     pub fn new(bvh: &'a Bvh, margin: Option<f32>) -> Result<Self, Error> {
-        if let Some(found) = margin
-            && !(found >= 0.0 && found.is_finite())
-        {
-            return Err(Error::Range {
-                what: "margin",
-                found: found.into(),
-                wanted: "a finite number from 0",
-            });
+        if let Some(found) = margin {
+            let is_in = found >= 0.0 && found.is_finite();
+            Error::check_range("margin", found.into(), is_in, "a finite number from 0")?;
         }
         Ok(Self { bvh, margin })
     }
@@ -466,34 +461,19 @@ impl Task<'_> {
     fn matrix(&self) -> Result<BitMatrix, Error> {
         let mut seen = BitMatrix::new(self.rows.len(), self.columns)?;
         let width = seen.words_per_row();
-        self.run(width, seen.words_mut(), &|_, bits, words: &mut [u64]| {
-            words.copy_from_slice(bits);
-        })?;
-        Ok(seen)
-    }
-
-    /// Fills `values`, so many for each row, with what `finish` makes of the row and its bits.
-    fn run<T: Send>(
-        &self,
-        width: usize,
-        values: &mut [T],
-        finish: Finish<'_, usize, T>,
-    ) -> Result<(), Error> {
-        let per_row = self.columns.div_ceil(64);
         let progress = Progress::new(self.monitor, self.rows.len());
-        for_blocks((RAYS, self.columns), width, values, |first, values| {
+        let sizes = (RAYS, self.columns);
+        for_blocks(sizes, width, seen.words_mut(), |first, words| {
             let first = self.rows.start + first;
-            let rows = first..first + values.len() / width;
+            let rows = first..first + words.len() / width;
             let count = rows.len();
             let mut tracer = Tracer::new(self.bvh, self.monitor);
-            tracer.trace(rows, per_row, self.rays)?;
-            for (row, values) in values.chunks_exact_mut(width).enumerate() {
-                let bits = &tracer.seen[row * per_row..][..per_row];
-                finish(first + row, bits, values);
-            }
+            tracer.trace(rows, width, self.rays)?;
+            words.copy_from_slice(&tracer.seen);
             progress.add(count);
             Ok(())
-        })
+        })?;
+        Ok(seen)
     }
 }
 
@@ -511,28 +491,6 @@ fn for_blocks<T: Send>(
     let block = (rays / columns.max(1)).clamp(1, MOST_POINTS);
     let blocks = values.par_chunks_mut(block * width).enumerate();
     blocks.try_for_each(|(index, values)| work(index * block, values))
-}
-
-/// Counts the rows that are done for a monitor.
-struct Progress<'a> {
-    monitor: &'a dyn Monitor,
-    done: AtomicUsize,
-    of: usize,
-}
-
-impl<'a> Progress<'a> {
-    fn new(monitor: &'a dyn Monitor, of: usize) -> Self {
-        Self {
-            monitor,
-            done: AtomicUsize::new(0),
-            of,
-        }
-    }
-
-    fn add(&self, rows: usize) {
-        let before = self.done.fetch_add(rows, Ordering::Relaxed);
-        self.monitor.progress(before + rows, self.of);
-    }
 }
 
 /// Rays that wait, and the places of their bits.
@@ -584,8 +542,6 @@ impl<'a> Tracer<'a> {
     /// Traces the rays that wait.
     fn flush(&mut self) -> Result<(), Error> {
         if self.monitor.cancelled() {
-            self.rays.clear();
-            self.places.clear();
             return Err(Error::Cancelled);
         }
         self.occluded.clear();

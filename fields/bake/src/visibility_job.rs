@@ -7,7 +7,7 @@ use antumbra::Bvh;
 use crate::job::{bytes_of, words_of};
 use crate::orientation::dot;
 use crate::visibility::{SightRange, sees_points_within};
-use crate::{BitMatrix, Error, Job, Key, Monitor, Sensors, ones, sees_each_other};
+use crate::{Answers, BitMatrix, Error, Job, Key, Monitor, Sensors, ones, sees_each_other};
 
 /// Eyes of sensors, with the normals of their surfaces.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,12 +85,7 @@ impl Job for VisibilityJob<'_> {
         }
     }
 
-    fn answers(
-        &self,
-        bvh: &Bvh,
-        items: Range<usize>,
-        monitor: &dyn Monitor,
-    ) -> Result<Vec<u8>, Error> {
+    fn answers(&self, bvh: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers {
         let (rows, margin) = (&self.rows.points, self.margin);
         let seen = match self.columns {
             Some(columns) => {

@@ -232,7 +232,7 @@ mod tests {
     use antumbra::Recipe;
 
     use super::*;
-    use crate::Key;
+    use crate::{Answers, Key};
 
     /// The bytes 0 to 4. Items have so many rays that there are two in a chunk.
     struct Numbers(&'static str);
@@ -258,7 +258,7 @@ mod tests {
             key.text(self.0);
         }
 
-        fn answers(&self, _: &Bvh, items: Range<usize>, _: &dyn Monitor) -> Result<Vec<u8>, Error> {
+        fn answers(&self, _: &Bvh, items: Range<usize>, _: &dyn Monitor) -> Answers {
             Ok(items.map(|item| item as u8).collect())
         }
 
