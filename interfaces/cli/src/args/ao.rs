@@ -6,7 +6,7 @@ use antumbra_bake::AmbientOcclusion;
 use clap::{ArgAction, Args};
 
 use super::values::Resolution;
-use super::{ChunkArgs, MachineArgs, PoseArgs, SCENE, SCENE_LONG, heading, values};
+use super::{ChunkArgs, PoseArgs, SCENE, SCENE_LONG, heading, values};
 use crate::json::Destination;
 
 /// Flags of `ao`.
@@ -73,6 +73,4 @@ pub struct AoArgs {
     pub seed: u64,
     #[command(flatten)]
     pub chunks: ChunkArgs,
-    #[command(flatten)]
-    pub machine: MachineArgs,
 }

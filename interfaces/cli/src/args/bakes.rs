@@ -43,7 +43,7 @@ pub enum BakeCommand {
     Factors(FactorArgs),
 }
 
-/// Does the same with the arguments of any bake. All have `scene`, `output`, `json`, `chunks` and `machine`.
+/// Does the same with the arguments of any bake. All have `scene`, `output`, `json` and `chunks`.
 macro_rules! of_bake {
     ($bake:expr, $args:ident => $what:expr) => {
         match $bake {

@@ -3,9 +3,9 @@
 use antumbra_render::Shard;
 use clap::Args;
 
-use super::heading;
+use super::{MachineArgs, heading};
 
-/// Flags about unfinished work and shares of it.
+/// Flags about unfinished work and shares of it, and about the machine that does it.
 #[derive(Debug, Args)]
 #[command(next_help_heading = heading::CHECKPOINTS)]
 pub struct ChunkArgs {
@@ -20,4 +20,6 @@ pub struct ChunkArgs {
     /// I runs from 0 to N - 1. `merge` joins the parts; run it where the mesh can be read under the same name.
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
+    #[command(flatten)]
+    pub machine: MachineArgs,
 }

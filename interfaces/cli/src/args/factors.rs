@@ -6,7 +6,7 @@ use antumbra_bake::UpAxis;
 use clap::Args;
 
 use super::sensors::up_axis;
-use super::{By, ChunkArgs, MachineArgs, SCENE, SCENE_LONG, heading, values};
+use super::{By, ChunkArgs, SCENE, SCENE_LONG, heading, values};
 use crate::json::Destination;
 
 /// Flags of `factors`.
@@ -43,6 +43,4 @@ pub struct FactorArgs {
     pub north: f64,
     #[command(flatten)]
     pub chunks: ChunkArgs,
-    #[command(flatten)]
-    pub machine: MachineArgs,
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, Subcommand};
 
 use super::{SCENE, SCENE_LONG, heading};
 
@@ -23,23 +23,7 @@ pub enum FarmCommand {
 }
 
 /// Commands that many machines can share.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum FarmJob {
-    Render,
-    Ao,
-    Sun,
-    Visible,
-    Horizon,
-    Factors,
-}
-
-impl FarmJob {
-    /// Name of the command.
-    pub fn name(self) -> String {
-        let value = self.to_possible_value();
-        value.map_or_else(String::new, |value| value.get_name().to_owned())
-    }
-}
+const JOBS: [&str; 6] = ["render", "ao", "sun", "visible", "horizon", "factors"];
 
 /// Flags of everything that renders on many machines.
 #[derive(Debug, Args)]
@@ -57,8 +41,8 @@ pub struct FarmArgs {
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub lines: Option<PathBuf>,
     /// ao, sun, visible, horizon, factors
-    #[arg(long = "command", value_name = "COMMAND", value_enum, default_value_t = FarmJob::Render, hide_possible_values = true, help_heading = heading::JOB)]
-    pub job: FarmJob,
+    #[arg(long = "command", value_name = "COMMAND", value_parser = JOBS, default_value = JOBS[0], hide_possible_values = true, help_heading = heading::JOB)]
+    pub job: String,
     /// Standard error of every pixel's mean, as .exr
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub stderr_image: Option<PathBuf>,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::{ArgGroup, Args};
 
-use super::{ChunkArgs, MachineArgs, PlaceArgs, RasterArgs, SCENE, SCENE_LONG, heading, values};
+use super::{ChunkArgs, PlaceArgs, RasterArgs, SCENE, SCENE_LONG, heading, values};
 use crate::json::Destination;
 
 /// Flags of `horizon`.
@@ -35,8 +35,6 @@ pub struct HorizonArgs {
     pub places: PlaceArgs,
     #[command(flatten)]
     pub chunks: ChunkArgs,
-    #[command(flatten)]
-    pub machine: MachineArgs,
 }
 
 impl HorizonArgs {

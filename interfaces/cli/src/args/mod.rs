@@ -52,7 +52,7 @@ pub use camera::{CameraArgs, PoseArgs};
 pub use chunks::ChunkArgs;
 pub use display::{AovNames, DisplayArgs, is_for_displays, usual};
 pub use factors::FactorArgs;
-pub use farm::{FarmArgs, FarmCommand, FarmJob, OpenjdArgs, SlurmArgs};
+pub use farm::{FarmArgs, FarmCommand, OpenjdArgs, SlurmArgs};
 pub use horizon::HorizonArgs;
 pub use image::{CompareArgs, ImageCommand};
 pub use info::InfoArgs;

@@ -7,8 +7,7 @@ use antumbra_bake::{Moment, SkyDivision};
 use clap::{ArgGroup, Args, ValueEnum};
 
 use super::{
-    ChunkArgs, MachineArgs, MapArgs, PlaceArgs, RasterArgs, SCENE, SCENE_LONG, TimeArgs, heading,
-    values,
+    ChunkArgs, MapArgs, PlaceArgs, RasterArgs, SCENE, SCENE_LONG, TimeArgs, heading, values,
 };
 use crate::json::Destination;
 
@@ -121,8 +120,6 @@ pub struct SunArgs {
     pub sky: SkyDivision,
     #[command(flatten)]
     pub chunks: ChunkArgs,
-    #[command(flatten)]
-    pub machine: MachineArgs,
 }
 
 /// What groups of sensors have in common.

@@ -56,6 +56,17 @@ impl FromStr for Noise {
     }
 }
 
+/// Parses a name; `None` is `auto`.
+fn auto_or<T: FromStr<Err = UnknownName>>(text: &str) -> Result<Option<T>, String> {
+    match text {
+        "auto" => Ok(None),
+        name => name
+            .parse()
+            .map(Some)
+            .map_err(|error| format!("{error}, auto")),
+    }
+}
+
 /// An instruction set or the best there is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LevelChoice {
@@ -67,13 +78,7 @@ impl FromStr for LevelChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "auto" => Ok(Self::Auto),
-            name => name
-                .parse()
-                .map(Self::Fixed)
-                .map_err(|error: antumbra::recipe::UnknownName| format!("{error}, auto")),
-        }
+        auto_or(text).map(|fixed| fixed.map_or(Self::Auto, Self::Fixed))
     }
 }
 
@@ -176,51 +181,30 @@ impl FromStr for WidthChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "auto" => Ok(Self::Auto),
-            name => name
-                .parse()
-                .map(Self::Fixed)
-                .map_err(|error: antumbra::recipe::UnknownName| format!("{error}, auto")),
+        auto_or(text).map(|fixed| fixed.map_or(Self::Auto, Self::Fixed))
+    }
+}
+
+/// Declares a list of rows of a table, each once.
+macro_rules! list_of {
+    ($(#[$doc:meta])* $list:ident($row:ty), $all:expr, $parse:expr) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq, Eq)]
+        pub struct $list(pub Vec<$row>);
+
+        impl FromStr for $list {
+            type Err = String;
+
+            fn from_str(text: &str) -> Result<Self, String> {
+                list_or_all(text, $all, $parse).map(Self)
+            }
         }
-    }
+    };
 }
 
-/// Several orders, each once.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Orders(pub Vec<Order>);
-
-impl FromStr for Orders {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        list_or_all(text, &ORDERS, antumbra_trees::order).map(Self)
-    }
-}
-
-/// Several collapses, each once.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Collapses(pub Vec<Collapse>);
-
-impl FromStr for Collapses {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        list_or_all(text, &COLLAPSES, antumbra_trees::collapse).map(Self)
-    }
-}
-
-/// Several builders, each once.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Trees(pub Vec<Builder>);
-
-impl FromStr for Trees {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        list_or_all(text, &BUILDERS, antumbra_trees::builder).map(Self)
-    }
-}
+list_of!(/** Several orders. */ Orders(Order), &ORDERS, antumbra_trees::order);
+list_of!(/** Several collapses. */ Collapses(Collapse), &COLLAPSES, antumbra_trees::collapse);
+list_of!(/** Several builders. */ Trees(Builder), &BUILDERS, antumbra_trees::builder);
 
 /// A place of the eye.
 #[derive(Clone, Debug, PartialEq)]
@@ -260,52 +244,41 @@ pub fn output_file() -> impl TypedValueParser<Value = PathBuf> {
     })
 }
 
+/// Parses a number that is as wanted.
+fn number<T: FromStr>(text: &str, is_right: fn(&T) -> bool, wanted: &str) -> Result<T, String> {
+    let number = text.parse().ok().filter(is_right);
+    number.ok_or_else(|| format!("it must be a number{wanted}"))
+}
+
 /// Parses a distance above 0.
 pub fn distance(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(distance) if distance > 0.0 => Ok(distance),
-        _ => Err("it must be a number above 0".into()),
-    }
+    number(text, |&distance: &f32| distance > 0.0, " above 0")
 }
 
 /// Parses an angle between 0 and 180 degrees.
 pub fn angle_of_view(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(angle) if angle > 0.0 && angle < 180.0 => Ok(angle),
-        _ => Err("it must be a number between 0 and 180".into()),
-    }
+    let is_right = |&angle: &f32| angle > 0.0 && angle < 180.0;
+    number(text, is_right, " between 0 and 180")
 }
 
 /// Parses a number above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(number) if number > 0.0 && number.is_finite() => Ok(number),
-        _ => Err("it must be a number above 0".into()),
-    }
+    number(text, |&x: &f64| x > 0.0 && x.is_finite(), " above 0")
 }
 
 /// Parses a finite number.
 pub fn finite(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(number) if number.is_finite() => Ok(number),
-        _ => Err("it must be a number".into()),
-    }
+    number(text, |x: &f64| x.is_finite(), "")
 }
 
 /// Parses a number that is not negative.
 pub fn from_zero(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(number) if number >= 0.0 && number.is_finite() => Ok(number),
-        _ => Err("it must be a number from 0".into()),
-    }
+    number(text, |&x: &f64| x >= 0.0 && x.is_finite(), " from 0")
 }
 
 /// Parses a part of a whole.
 pub fn part(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(number) if (0.0..=1.0).contains(&number) => Ok(number),
-        _ => Err("it must be a number from 0 to 1".into()),
-    }
+    number(text, |x: &f64| (0.0..=1.0).contains(x), " from 0 to 1")
 }
 
 /// Parses the cost of a step of a traversal.

@@ -6,7 +6,7 @@ use antumbra_bake::UpAxis;
 use clap::{ArgGroup, Args};
 
 use super::sensors::{UnitArgs, up_axis};
-use super::{ChunkArgs, MachineArgs, MapArgs, RasterArgs, SCENE, SCENE_LONG, heading, values};
+use super::{ChunkArgs, MapArgs, RasterArgs, SCENE, SCENE_LONG, heading, values};
 use crate::json::Destination;
 
 /// Flags of `visible`.
@@ -87,6 +87,4 @@ pub struct VisibleArgs {
     pub units: UnitArgs,
     #[command(flatten)]
     pub chunks: ChunkArgs,
-    #[command(flatten)]
-    pub machine: MachineArgs,
 }

@@ -192,17 +192,12 @@ fn atlas(ground: &Ground, size: u32) -> Result<Atlas, Failure> {
         };
         Failure::Usage(format!("--atlas: {of}"))
     })?;
-    if atlas.left_out > 0 {
-        let left_out = atlas.left_out;
-        tell(format_args!(
-            "note: {left_out} triangles have no texture coordinates and are left out"
-        ));
-    }
-    if atlas.overlaps > 0 {
-        let overlaps = atlas.overlaps;
-        tell(format_args!(
-            "note: {overlaps} texels are covered more than once; the first triangle has them"
-        ));
+    let left_out = "triangles have no texture coordinates and are left out";
+    let overlaps = "texels are covered more than once; the first triangle has them";
+    for (number, what) in [(atlas.left_out, left_out), (atlas.overlaps, overlaps)] {
+        if number > 0 {
+            tell(format_args!("note: {number} {what}"));
+        }
     }
     Ok(atlas)
 }

@@ -10,10 +10,10 @@ use antumbra_load::MemorySize;
 use serde::{Serialize, Serializer};
 
 use super::chunks::{self, PartFile};
-use super::ground::{Earth, Ground};
+use super::ground::Ground;
 use super::map;
 use super::terrain::Terrain;
-use crate::args::{BakeCommand, ChunkArgs, MachineArgs, of_bake};
+use crate::args::{BakeCommand, ChunkArgs, VisibleArgs, of_bake};
 use crate::exit::{Failure, tell};
 use crate::json::Destination;
 use crate::output::Files;
@@ -41,7 +41,7 @@ pub fn run(
     parts: Option<&[PartFile]>,
 ) -> Result<(), Failure> {
     of_bake!(command, args => {
-        let isa = args.machine.isa()?;
+        let isa = args.chunks.machine.isa()?;
         let is_ao = matches!(command, BakeCommand::Ao(_));
         // What a share of ambient occlusion is of depends on its flags.
         if args.chunks.shard.is_none() || is_ao {
@@ -52,7 +52,6 @@ pub fn run(
             outputs: &args.output,
             json: args.json.as_ref(),
             chunks: &args.chunks,
-            machine: &args.machine,
             isa,
             memory,
             parts,
@@ -72,7 +71,6 @@ pub struct Bake<'a> {
     pub outputs: &'a [PathBuf],
     json: Option<&'a Destination>,
     chunks: &'a ChunkArgs,
-    machine: &'a MachineArgs,
     pub isa: Isa,
     memory: MemorySize,
     /// Shares to take instead of computing anything.
@@ -138,15 +136,15 @@ impl Bake<'_> {
         Ok(files)
     }
 
-    /// Starts the threads, reads the scene and builds its tree. An `earth` bends the scene.
-    pub fn ground(&self, files: &mut Files, earth: Option<Earth<'_>>) -> Result<Ground, Failure> {
-        self.machine.start_threads()?;
-        Ground::load(self.scene, self.isa, self.memory, files, earth)
+    /// Starts the threads, reads the scene and builds its tree, [bent](Ground::load) if flags say so.
+    pub fn ground(&self, files: &mut Files, bent: Option<&VisibleArgs>) -> Result<Ground, Failure> {
+        self.chunks.machine.start_threads()?;
+        Ground::load(self.scene, self.isa, self.memory, files, bent)
     }
 
     /// Starts the threads and reads a height raster, for a job without a mesh and without a tree.
     pub fn terrain(&self, files: &mut Files) -> Result<Terrain, Failure> {
-        self.machine.start_threads()?;
+        self.chunks.machine.start_threads()?;
         Terrain::load(self.scene, self.memory, files)
     }
 

@@ -90,20 +90,18 @@ impl Baked<'_> {
             let words = self.words(("Sunlight", ""), Some(map::moment(&middle)));
             sheet.draw(&words, &lit, Steps::classes(&CLASSES))
         };
-        if !is_gif(path)? {
-            for (index, &step) in steps.iter().enumerate() {
-                interrupt::check()?;
-                let pixels = draw(step)?.pixels().map_err(Failure::work)?;
-                pixels.write(numbered(path, index + 1))?;
-            }
-            return Ok(());
-        }
-        let mut animation = Animation::new(SECONDS);
-        for &step in &steps {
+        let mut animation = is_gif(path)?.then(|| Animation::new(SECONDS));
+        for (index, &step) in steps.iter().enumerate() {
             interrupt::check()?;
             let pixels = draw(step)?.pixels().map_err(Failure::work)?;
-            animation.add(&pixels).map_err(Failure::work)?;
+            match &mut animation {
+                Some(animation) => animation.add(&pixels).map_err(Failure::work)?,
+                None => pixels.write(numbered(path, index + 1))?,
+            }
         }
+        let Some(animation) = animation else {
+            return Ok(());
+        };
         let bytes = animation.finish().map_err(Failure::work)?;
         Ok(atomic_write(path, |file| file.write_all(&bytes))?)
     }

@@ -17,7 +17,7 @@ use antumbra_render::World;
 use antumbra_scene::{Geometry, Scene, Shape, TriangleMesh};
 
 use super::parts::Parts;
-use crate::args::UnitArgs;
+use crate::args::VisibleArgs;
 use crate::exit::{Failure, say, tell};
 use crate::output::Files;
 use crate::{input, interrupt, scenes};
@@ -41,23 +41,20 @@ pub struct Ground {
 }
 
 impl Ground {
-    /// Reads a scene and builds its tree.
+    /// Reads a scene and builds its tree. Flags of `visible` with `--curvature` bend it.
     pub fn load(
         name: &Path,
         isa: Isa,
         memory: MemorySize,
         files: &mut Files,
-        earth: Option<Earth<'_>>,
+        bent: Option<&VisibleArgs>,
     ) -> Result<Self, Failure> {
         let mut loaded = scenes::load(name, memory)?;
         files.reads_all(&loaded.inputs)?;
         let flat = loaded.scene.flattened();
         let flat = flat.map_err(|error| Failure::scene(&loaded.scene.name, error))?;
         loaded.scene = flat.into_owned();
-        let curvature = match earth {
-            Some(earth) => Some(earth.bend(&mut loaded)?),
-            None => None,
-        };
+        let curvature = bent.map(|args| bend(args, &mut loaded)).transpose()?;
         let (mesh, _) = mesh(&loaded.scene, false)?;
         let parts = Parts::new(&loaded.scene, &loaded.names);
         let local = LocalOrigin {
@@ -233,62 +230,46 @@ impl Ground {
     }
 }
 
-/// An earth that scenes are bent by.
-#[derive(Clone, Copy, Debug)]
-pub struct Earth<'a> {
-    /// In metres.
-    pub radius: f64,
-    pub units: &'a UnitArgs,
-    /// Coordinate system of the command line.
-    pub crs: Option<&'a Crs>,
-    pub refraction: f64,
-    /// The up axis, if the command line has one.
-    pub up: Option<UpAxis>,
-}
-
-impl Earth<'_> {
-    /// Bends all meshes, so that lines of sight over a round earth are straight.
-    fn bend(self, loaded: &mut Loaded) -> Result<Curvature, Failure> {
-        let raster = loaded.raster.as_ref();
-        let crs = self
-            .crs
-            .or(raster.and_then(|raster| raster.grid.crs.as_ref()));
-        if let Some(metres) = crs.and_then(Crs::metres) {
-            self.units.settle(metres);
-        }
-        let scene = &mut loaded.scene;
-        let up = match (self.up, loaded.up.axis) {
-            (Some(up), _) => up,
-            (None, Up::Y) => UpAxis::Y,
-            (None, _) => UpAxis::Z,
-        };
-        let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
-        let extent = Extent::of(scene);
-        let centre = extent.map_or([0.0; 3], |extent| {
-            extent.low.midpoint(extent.high).to_array()
-        });
-        let curvature = Curvature::new(
-            self.radius / self.units.metres(),
-            self.refraction,
-            centre,
-            plan,
-        );
-        let curvature = curvature.map_err(Failure::usage)?;
-        for shape in &mut scene.shapes {
-            let Geometry::Mesh(mesh) = &mut shape.geometry else {
-                let reason = "--curvature: it has spheres or curves, which cannot be bent";
-                return Err(Failure::scene(&scene.name, reason));
-            };
-            let mesh = Arc::make_mut(mesh);
-            for (normal, &point) in mesh.normals.iter_mut().zip(&mesh.positions) {
-                *normal = curvature.bend_normal(point, normal.to_array()).into();
-            }
-            for point in &mut mesh.positions {
-                *point = curvature.bend(*point);
-            }
-        }
-        Ok(curvature)
+/// Bends all meshes, so that lines of sight over a round earth are straight.
+fn bend(args: &VisibleArgs, loaded: &mut Loaded) -> Result<Curvature, Failure> {
+    let raster = loaded.raster.as_ref();
+    let own = raster.and_then(|raster| raster.grid.crs.as_ref());
+    let crs = args.raster.crs.as_ref().or(own);
+    if let Some(metres) = crs.and_then(Crs::metres) {
+        args.units.settle(metres);
     }
+    let scene = &mut loaded.scene;
+    let up = match (args.up, loaded.up.axis) {
+        (Some(up), _) => up,
+        (None, Up::Y) => UpAxis::Y,
+        (None, _) => UpAxis::Z,
+    };
+    let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
+    let extent = Extent::of(scene);
+    let centre = extent.map_or([0.0; 3], |extent| {
+        extent.low.midpoint(extent.high).to_array()
+    });
+    let curvature = Curvature::new(
+        args.earth_radius / args.units.metres(),
+        args.refraction,
+        centre,
+        plan,
+    );
+    let curvature = curvature.map_err(Failure::usage)?;
+    for shape in &mut scene.shapes {
+        let Geometry::Mesh(mesh) = &mut shape.geometry else {
+            let reason = "--curvature: it has spheres or curves, which cannot be bent";
+            return Err(Failure::scene(&scene.name, reason));
+        };
+        let mesh = Arc::make_mut(mesh);
+        for (normal, &point) in mesh.normals.iter_mut().zip(&mesh.positions) {
+            *normal = curvature.bend_normal(point, normal.to_array()).into();
+        }
+        for point in &mut mesh.positions {
+            *point = curvature.bend(*point);
+        }
+    }
+    Ok(curvature)
 }
 
 /// All meshes of a scene without instances, perhaps with creases, and how many vertices these add.
@@ -315,15 +296,12 @@ fn mesh(scene: &Scene, creases: bool) -> Result<(Mesh, usize), Failure> {
         return Err(Failure::scene(&scene.name, reason));
     }
     // Said once, where the scene is read.
-    if spheres > 0 && !creases {
-        tell(format_args!(
-            "note: {spheres} spheres occlude, but have no vertices to write"
-        ));
-    }
-    if curves > 0 && !creases {
-        tell(format_args!(
-            "note: {curves} curves occlude, but have no vertices to write"
-        ));
+    for (number, kind) in [(spheres, "spheres"), (curves, "curves")] {
+        if number > 0 && !creases {
+            tell(format_args!(
+                "note: {number} {kind} occlude, but have no vertices to write"
+            ));
+        }
     }
     Ok((all, copies))
 }

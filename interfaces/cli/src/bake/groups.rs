@@ -71,16 +71,10 @@ impl Baked<'_> {
         let triangles = self.places.triangles(self.ground, self.up, &groups)?;
         let cover = Cover::new(&groups, self.sensors, &triangles);
         let metres = self.args.places.units.metres();
-        let whole: Vec<f64> = groups
-            .areas
-            .iter()
-            .map(|area| area * metres * metres)
-            .collect();
-        let areas: Vec<f64> = whole
-            .iter()
-            .zip(&cover.shares)
-            .map(|(area, share)| area * (1.0 - share))
-            .collect();
+        let whole = groups.areas.iter().map(|area| area * metres * metres);
+        let whole: Vec<f64> = whole.collect();
+        let open = whole.iter().zip(&cover.shares);
+        let areas: Vec<f64> = open.map(|(area, share)| area * (1.0 - share)).collect();
         if let Some(spacing) = self.args.places.placement.surfaces {
             self.check_areas(&groups, &cover, &whole, spacing * spacing);
         }
@@ -132,22 +126,17 @@ struct Cover {
 
 impl Cover {
     fn new(groups: &Groups, sensors: &Sensors, triangles: &[Option<u32>]) -> Self {
-        let is_covered = |sensor: usize| {
-            let kinds = sensors
-                .labels
-                .iter()
-                .find(|label| label.column == "surface");
-            kinds.is_some_and(|kinds| kinds.values[sensor] == Surface::Covered.name())
-        };
+        let kinds = sensors.label("surface");
+        let is_covered =
+            |sensor: usize| kinds.is_some_and(|kinds| kinds[sensor] == Surface::Covered.name());
         let mut counts = vec![0; groups.names.len()];
         let mut places = counts.clone();
         let mut open = triangles.to_vec();
         for (sensor, triangle) in open.iter_mut().enumerate() {
-            let Some(group) =
-                triangle.map(|triangle| groups.of_triangle[triangle as usize] as usize)
-            else {
+            let Some(triangle_of) = *triangle else {
                 continue;
             };
+            let group = groups.of_triangle[triangle_of as usize] as usize;
             places[group] += 1;
             if is_covered(sensor) {
                 counts[group] += 1;
@@ -159,10 +148,8 @@ impl Cover {
             counts[group] += 1;
             places[group] += 1;
         }
-        let shares = counts
-            .iter()
-            .zip(&places)
-            .map(|(&count, &all)| count as f64 / all.max(1) as f64);
+        let pairs = counts.iter().zip(&places);
+        let shares = pairs.map(|(&count, &all)| count as f64 / all.max(1) as f64);
         Self {
             shares: shares.collect(),
             open,
@@ -174,13 +161,12 @@ impl Cover {
     /// A row for what is covered of each object, or of all groups that are not facades. It has the columns of `like`.
     fn rows(&self, groups: &Groups, areas: &[f64], like: Option<&Row>) -> Vec<Row> {
         let mut sums: Vec<(Vec<String>, usize, f64)> = Vec::new();
-        for (group, names) in groups
-            .names
-            .iter()
-            .enumerate()
-            .filter(|(group, _)| self.counts[*group] > 0)
-        {
-            let mut names: Vec<String> = names[..names.len() - 1].to_vec();
+        for (group, names) in groups.names.iter().enumerate() {
+            if self.counts[group] == 0 {
+                continue;
+            }
+            let mut names = names.clone();
+            names.pop();
             names.push(Surface::Covered.name().into());
             let area = areas[group] * self.shares[group];
             match sums.iter_mut().find(|(known, ..)| *known == names) {
@@ -193,18 +179,10 @@ impl Cover {
         }
         let columns = like.iter().flat_map(|row| &row.0).map(|(name, _)| name);
         let row = |(names, count, area): (Vec<String>, usize, f64)| {
-            let mut row = Row(columns
-                .clone()
-                .map(|name| (name.clone(), Value::Null))
-                .collect());
-            let known = names
-                .into_iter()
-                .map(Value::from)
-                .chain([number(area), count.into()]);
-            for (place, value) in row.0.iter_mut().zip(known) {
-                place.1 = value;
-            }
-            row
+            let known = names.into_iter().map(Value::from);
+            let known = known.chain([number(area), count.into()]);
+            let values = known.chain(std::iter::repeat(Value::Null));
+            Row(columns.clone().cloned().zip(values).collect())
         };
         sums.into_iter().map(row).collect()
     }
@@ -232,12 +210,7 @@ impl Baked<'_> {
             })
             .collect();
         if !names.is_empty() {
-            let some = names
-                .iter()
-                .take(5)
-                .map(String::as_str)
-                .collect::<Vec<_>>()
-                .join(", ");
+            let some = names[..names.len().min(5)].join(", ");
             say(format_args!(
                 "warning: sensors stand for more or less than nine tenths of the area of {} groups ({some}): a smaller --surfaces may help",
                 names.len(),

@@ -31,11 +31,11 @@ impl Baked<'_> {
         let cells = hourly.len() as u64 * sensors.points.len() as u64;
         output::check_room(path, 4 * cells)?;
         Ok(atomic_write(path, |file| {
-            let names = sensors.labels.iter().find(|label| label.column == "name");
+            let names = sensors.label("name");
             let mut line = "time".to_owned();
             for row in 0..sensors.points.len() {
                 let _ = match names {
-                    Some(names) => write!(line, ",{}", files::field(&names.values[row])),
+                    Some(names) => write!(line, ",{}", files::field(&names[row])),
                     None => write!(line, ",{}", row + 1),
                 };
             }

@@ -18,20 +18,9 @@ const MOST_PIXELS: f64 = 4e7;
 /// Seconds of a day.
 const DAY: f64 = 86_400.0;
 
-const MONTHS: [&str; 12] = [
-    "January",
-    "February",
-    "March",
-    "April",
-    "May",
-    "June",
-    "July",
-    "August",
-    "September",
-    "October",
-    "November",
-    "December",
-];
+/// Names of the months.
+const MONTHS: &str =
+    "January February March April May June July August September October November December";
 
 /// Texts of a map.
 #[derive(Default)]
@@ -267,15 +256,13 @@ pub fn place(latitude: f64, longitude: f64) -> String {
         let side = if angle < 0.0 { negative } else { positive };
         format!("{:.4}° {side}", angle.abs())
     };
-    format!(
-        "{}, {}",
-        part(latitude, ["N", "S"]),
-        part(longitude, ["E", "W"])
-    )
+    let (latitude, longitude) = (part(latitude, ["N", "S"]), part(longitude, ["E", "W"]));
+    format!("{latitude}, {longitude}")
 }
 
 fn date(moment: &Moment) -> String {
-    let month = MONTHS[(moment.month as usize - 1).min(11)];
+    let month = MONTHS.split(' ').nth(moment.month as usize - 1);
+    let month = month.unwrap_or_default();
     format!("{} {month} {}", moment.day, moment.year)
 }
 
@@ -302,13 +289,8 @@ pub fn period(from: &Moment, to: &Moment) -> String {
         (true, false) => format!("{} to {}", date(from), date(&last)),
         (false, true) => format!("{}, {} to {}", date(from), clock(from), clock(to)),
         (false, false) => {
-            format!(
-                "{} {} to {} {}",
-                date(from),
-                clock(from),
-                date(to),
-                clock(to)
-            )
+            let [from, to] = [from, to].map(|end| format!("{} {}", date(end), clock(end)));
+            format!("{from} to {to}")
         }
     }
 }

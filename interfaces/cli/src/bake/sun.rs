@@ -84,9 +84,8 @@ impl Baking for SunArgs {
         let mut ground = bake.ground(&mut files, None)?;
         let up = ground.up(self.places.up)?;
         let (when, sunlight) = When::at(self, weather.as_ref(), &ground, up)?;
-        if let Some(path) = &self.frames {
-            frames::declare(path, &sunlight, &mut files)?;
-        }
+        let mut frames = self.frames.iter();
+        frames.try_for_each(|path| frames::declare(path, &sunlight, &mut files))?;
         let places = Places::new(&self.places, &mut ground, up)?;
         if self.groups.is_some() && ground.surfaces.is_none() {
             ground.face(&sunlight.orientation);
@@ -111,22 +110,11 @@ impl Baking for SunArgs {
             bake.outputs.iter().try_for_each(|path| baked.write(path))?;
             self.hourly.iter().try_for_each(|path| baked.hourly(path))?;
             self.frames.iter().try_for_each(|path| baked.frames(path))?;
-            groups = self
-                .groups
-                .as_deref()
-                .map(|path| baked.groups(path))
-                .transpose()?;
+            if let Some(path) = &self.groups {
+                groups = Some(baked.groups(path)?);
+            }
         }
-        let means = done.found.as_ref().map(|found| {
-            let SunValues {
-                hours,
-                sky_view,
-                direct,
-                diffuse,
-                ..
-            } = &found.values;
-            [hours, sky_view, direct, diffuse].map(|list| mean(list))
-        });
+        let means = done.found.as_ref().map(|found| means(&found.values));
         let means @ [hours, view, direct, diffuse] = means.unwrap_or_default();
         let rays = baked.as_ref().map_or(0, |_| job.rays());
         let (of, suns) = (sensors.points.len(), &sunlight.suns);
@@ -142,10 +130,7 @@ impl Baking for SunArgs {
             ("timezone", &when.zone),
             ("steps", &sunlight.steps()),
             ("suns", &suns.times.len()),
-            (
-                "step_hours",
-                &suns.hours.first().copied().unwrap_or_default(),
-            ),
+            ("step_hours", suns.hours.first().unwrap_or(&0.0)),
             ("patches", &sunlight.patches.len()),
             ("rays", &rays),
             ("mean_hours", &hours),
@@ -265,16 +250,13 @@ impl Baked<'_> {
         }
         let is_dark = |index: &usize| self.found.values.sky_open[*index] == 0.0;
         let dark: Vec<usize> = (0..sensors.points.len()).filter(is_dark).collect();
-        let kinds = sensors
-            .labels
-            .iter()
-            .find(|label| label.column == "surface");
+        let kinds = sensors.label("surface");
         if let (Some(kinds), Some(_)) = (kinds, self.args.places.placement.surfaces) {
             let is_facade = |kind: &String| kind == Surface::Facade.name();
-            let facades = kinds.values.iter().filter(|kind| is_facade(kind)).count();
+            let facades = kinds.iter().filter(|kind| is_facade(kind)).count();
             let closed = dark
                 .iter()
-                .filter(|&&index| is_facade(&kinds.values[index]))
+                .filter(|&&index| is_facade(&kinds[index]))
                 .count();
             if closed as f64 > DARK * facades as f64 {
                 say(format_args!(
@@ -541,9 +523,17 @@ impl Baked<'_> {
     }
 }
 
-/// Mean of the values that are numbers.
-fn mean(values: &[f64]) -> Option<f64> {
-    let known = || values.iter().filter(|value| !value.is_nan());
-    let count = known().count();
-    (count > 0).then(|| known().sum::<f64>() / count as f64)
+/// Means of hours, sky view, direct and diffuse irradiation, each over the values that are numbers.
+fn means(values: &SunValues) -> [Option<f64>; 4] {
+    let lists = [
+        &values.hours,
+        &values.sky_view,
+        &values.direct,
+        &values.diffuse,
+    ];
+    lists.map(|values| {
+        let known = || values.iter().filter(|value| !value.is_nan());
+        let count = known().count();
+        (count > 0).then(|| known().sum::<f64>() / count as f64)
+    })
 }

@@ -12,7 +12,7 @@ use antumbra_raster::{Quantity, unit_name};
 
 use super::command::{Bake, Baking, Done, Figure, Named, text};
 use super::files::{self, Column, Format};
-use super::ground::{self, Earth, Ground};
+use super::ground::{self, Ground};
 use super::map::{self, Plan, Words};
 use super::site::Asked;
 use super::{raster, viewshed};
@@ -62,14 +62,7 @@ impl Baking for VisibleArgs {
         if viewshed::is_of_cells(self) {
             return viewshed::run(self, bake, files);
         }
-        let earth = self.curvature.then_some(Earth {
-            radius: self.earth_radius,
-            units: &self.units,
-            crs: self.raster.crs.as_ref(),
-            refraction: self.refraction,
-            up: self.up,
-        });
-        let ground = bake.ground(&mut files, earth)?;
+        let ground = bake.ground(&mut files, self.curvature.then_some(self))?;
         let up = ground.up(self.up)?;
         let site = asked(self).of(&ground.loaded, up)?;
         let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use clap::Parser;
 use serde::{Deserialize, Serialize};
 
-use crate::args::{Cli, Command, FarmArgs, FarmCommand, FarmJob, of_bake};
+use crate::args::{Cli, Command, FarmArgs, FarmCommand, of_bake};
 use crate::bake::Baking as _;
 use crate::exit::Failure;
 use crate::output::{self, Files};
@@ -54,7 +54,7 @@ struct Plan {
 
 /// The command of plans that name none.
 fn render() -> String {
-    FarmJob::Render.name()
+    "render".to_owned()
 }
 
 impl Plan {
@@ -62,12 +62,12 @@ impl Plan {
         let Some((output, more)) = args.output.split_first() else {
             return Err(Failure::Usage("--output is missing".into()));
         };
-        if args.lines.is_some() && args.job != FarmJob::Visible {
+        if args.lines.is_some() && args.job != "visible" {
             let reason = "--lines: only visible has lines of sight";
             return Err(Failure::Usage(reason.into()));
         }
-        match args.job {
-            FarmJob::Render => {
+        match &*args.job {
+            "render" => {
                 check_image_names(Some(output), args.stderr_image.as_deref())?;
                 if !more.is_empty() {
                     let reason = "--output: render writes one image";
@@ -100,7 +100,7 @@ impl Plan {
         };
         Ok(Self {
             program: text(&program)?,
-            command: args.job.name(),
+            command: args.job.clone(),
             scene,
             output: absolute(output)?,
             more_outputs: more
@@ -157,7 +157,7 @@ impl Plan {
 
     /// Whether tasks bake, and keep unfinished work in the part itself, instead of rendering a picture.
     fn is_bake(&self) -> bool {
-        self.command != FarmJob::Render.name()
+        self.command != render()
     }
 
     /// Arguments of the command for the shard that `task` stands for, with the part to write.
@@ -211,7 +211,7 @@ fn check_bake(args: &FarmArgs) -> Result<(), Failure> {
         return Err(Failure::Usage(reason.into()));
     }
     let parse = |more: &[OsString]| {
-        let line = ["antumbra", &args.job.name()].map(OsString::from);
+        let line = ["antumbra", &args.job].map(OsString::from);
         let line = line.into_iter().chain([args.scene.clone().into()]);
         let line = line.chain(args.flags.iter().map(Into::into));
         let cli = Cli::try_parse_from(line.chain(more.iter().cloned()));
