@@ -153,8 +153,12 @@ impl Bvh {
     /// not hide what is around it.
     ///
     /// It is [`Aabb::origin_offset`](crate::Aabb::origin_offset) of a box that holds the point and the primitives on which the point lies:
-    /// 4 millionths of the largest coordinate. Nothing that is farther away than four times the point's largest coordinate has a
-    /// say, so what is near is as sharp in a scene of 40 km as in one of 200 m. 0 for a point with a NaN or infinite coordinate.
+    /// 4 millionths of the largest coordinate. So what is near is as sharp in a scene of 40 km as in one of 200 m. Only where
+    /// everything is within four times the point's largest coordinate, it is the offset of the whole scene, since rays then do
+    /// not even visit the leaf that they leave. 0 for a point with a NaN or infinite coordinate.
+    ///
+    /// A point that is farther off its surface than its own coordinates are rounded needs a larger offset: `org + t * dir` of a
+    /// ray that came from far away is one, [`Surface::position`](crate::Surface::position) is not.
     ///
     /// Why that is enough: let `u = 2⁻²⁴`, and let `m` be the largest coordinate. A point that was computed from a surface is off it
     /// by a rounding or two of each coordinate, within `8 u m`, which is what "lies on" means here. Moving it along the normal
