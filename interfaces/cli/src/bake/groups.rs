@@ -15,6 +15,7 @@ use super::sun::Baked;
 use crate::args::By;
 use crate::exit::{Failure, say};
 use crate::interrupt;
+use crate::scenes::rounded;
 
 /// Values of a group with their names, in the order of the columns.
 pub struct Row(Vec<(String, Value)>);
@@ -206,13 +207,13 @@ impl Baked<'_> {
             .map(|group| {
                 let (name, area) = (groups.names[group].join(" "), areas[group]);
                 let own = cover.places[group] as f64 * square;
-                format!("{name}: {own:.0} m² of {area:.0}")
+                format!("{name}: {} m² of {}", rounded(own), rounded(area))
             })
             .collect();
         if !names.is_empty() {
             let some = names[..names.len().min(5)].join(", ");
             say(format_args!(
-                "warning: sensors stand for more or less than nine tenths of the area of {} groups ({some}): a smaller --surfaces may help",
+                "warning: the sensors of {} groups stand for an area that is more than a tenth off ({some}): a smaller --surfaces may help",
                 names.len(),
             ));
         }

@@ -324,6 +324,24 @@ fn energies_are_means_times_areas() {
     }
 }
 
+/// Strips of 0.6 m, whose middles lie on the lattice of 1 m: the sensors stand for 800 of 480 m².
+#[test]
+fn sensors_that_stand_for_another_area_are_told() {
+    let mut text = String::from("o fence\n");
+    for strip in 0..40 {
+        let [left, right] = [0.2, 0.8].map(|x| f64::from(strip) + x);
+        text += &format!("v {left} 0 0\nv {right} 0 0\nv {right} 20 0\nv {left} 20 0\n");
+        text += "f -4 -3 -2 -1\n";
+    }
+    let place = Place::empty();
+    place.write("fence.obj", text);
+    let flags = ["sun", "fence.obj", "-o", "sun.csv", "--surfaces", "1"];
+    let groups = ["--groups", "objects.csv", "--by", "object"];
+    let ran = place.run(&[&flags[..], &groups, &DAY].concat()).expect(0);
+    let wanted = "more than a tenth off (fence: 800 m² of 480)";
+    assert!(ran.stderr.contains(wanted), "{}", ran.stderr);
+}
+
 /// Names of a stranger's file do nothing in a spreadsheet or a terminal.
 #[test]
 fn names_are_only_read() {
