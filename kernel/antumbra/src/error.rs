@@ -217,156 +217,86 @@ pub enum Error {
     },
 }
 
+/// Matches an error and writes the text of its kind.
+macro_rules! say {
+    ($error:expr, $f:expr, { $($(#[$only:meta])* $kind:pat => $text:literal $(, $argument:expr)*;)* }) => {
+        match $error {
+            $($(#[$only])* $kind => write!($f, $text $(, $argument)*),)*
+        }
+    };
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::IndexOutOfRange {
-                geom_id,
-                prim_id,
-                index,
-                vertices,
-            } => write!(
-                f,
-                "triangle {prim_id} of geometry {geom_id} uses vertex {index}, but there are {vertices} vertices"
-            ),
-            Self::QuadIndexOutOfRange {
-                geom_id,
-                prim_id,
-                index,
-                vertices,
-            } => write!(
-                f,
-                "quad {prim_id} of geometry {geom_id} uses vertex {index}, but there are {vertices} vertices"
-            ),
-            Self::ObjectOutOfRange {
-                inst_id,
-                object,
-                objects,
-            } => write!(
-                f,
-                "instance {inst_id} places object {object}, but there are {objects} objects"
-            ),
-            Self::NestsItself { object } => {
-                write!(
-                    f,
-                    "object {object} holds an instance of itself, directly or by others"
-                )
-            }
-            Self::TooMany { what, found, limit } => write!(
-                f,
-                "{found} {what} are more than the {limit} that can be numbered"
-            ),
-            Self::OutOfMemory { what, found, bytes } => {
-                write!(f, "not enough memory for {found} {what}: {bytes} bytes")
-            }
-            Self::TooShort {
-                what,
-                needed,
-                found,
-            } => write!(
-                f,
-                "{what} of the rays need {needed} numbers, but there are {found}"
-            ),
-            Self::OtherFunctions {
-                what,
-                expected,
-                found,
-            } => {
-                let needed = expected.len();
-                write!(f, "the file needs {needed} {what}, and {found} were given")?;
-                for (index, geometry) in expected.iter().enumerate() {
-                    let before = if index == 0 { ": for" } else { "," };
-                    write!(f, "{before} {geometry}")?;
-                }
-                Ok(())
-            }
-            Self::Unreadable { what, why } => write!(f, "cannot read the {what}: {why}"),
+        say!(self, f, {
+            Self::IndexOutOfRange { geom_id, prim_id, index, vertices } =>
+                "triangle {prim_id} of geometry {geom_id} uses vertex {index}, but there are {vertices} vertices";
+            Self::QuadIndexOutOfRange { geom_id, prim_id, index, vertices } =>
+                "quad {prim_id} of geometry {geom_id} uses vertex {index}, but there are {vertices} vertices";
+            Self::ObjectOutOfRange { inst_id, object, objects } =>
+                "instance {inst_id} places object {object}, but there are {objects} objects";
+            Self::NestsItself { object } =>
+                "object {object} holds an instance of itself, directly or by others";
+            Self::TooMany { what, found, limit } =>
+                "{found} {what} are more than the {limit} that can be numbered";
+            Self::OutOfMemory { what, found, bytes } =>
+                "not enough memory for {found} {what}: {bytes} bytes";
+            Self::TooShort { what, needed, found } =>
+                "{what} of the rays need {needed} numbers, but there are {found}";
+            Self::OtherFunctions { what, expected, found } =>
+                "the file needs {} {what}, and {found} were given{}", expected.len(), Listed(expected);
+            Self::Unreadable { what, why } => "cannot read the {what}: {why}";
             #[cfg(feature = "std")]
-            Self::Io { message, .. } => write!(f, "{message}"),
-            Self::OtherKeys {
-                what,
-                id,
-                expected,
-                found,
-            } => write!(
-                f,
-                "{what} {id} has {found} keys, but needs 1 or {expected}, as everything that moves"
-            ),
-            Self::OtherVertices {
-                geom_id,
-                key,
-                expected,
-                found,
-            } => write!(
-                f,
-                "key {key} of mesh {geom_id} has {found} vertices, but key 0 has {expected}"
-            ),
-            Self::KeyPosition {
-                geom_id,
-                key,
-                vertex,
-                position: [x, y, z],
-            } => write!(
-                f,
-                "vertex {vertex} in key {key} of mesh {geom_id} is at ({x}, {y}, {z}): coordinates must be finite and below 2^125"
-            ),
-            Self::KeyTransform { inst_id, key } => write!(
-                f,
-                "key {key} of instance {inst_id} must be a finite transform that has an inverse"
-            ),
-            Self::KeysMirror { inst_id, key } => write!(
-                f,
-                "of the keys {key} and {} of instance {inst_id} one mirrors and the other does not",
-                key + 1
-            ),
-            Self::OutOfRange { inst_id } => write!(
-                f,
-                "the path of instance {inst_id} leaves the range of single precision"
-            ),
-            Self::Moves(why) => write!(f, "{why}"),
-            Self::OtherTrees { expected, found } => write!(
-                f,
-                "a scene that moves needs one tree per span between two keys, {expected} in all, but got {found}"
-            ),
-            Self::Cancelled => write!(f, "the build was cancelled"),
-            Self::OtherPrimitives { expected, found } => write!(
-                f,
-                "a refit needs the {expected} sound primitives of the build, but {found} were found: build again"
-            ),
-            Self::PrimitiveIsGone { geom_id, prim_id } => write!(
-                f,
-                "primitive {prim_id} of geometry {geom_id} is gone or unsound, so the tree cannot be refitted: build again"
-            ),
-            Self::HasInstances => write!(
-                f,
-                "a tree with instances cannot be refitted: place objects in a world and refit those"
-            ),
-            Self::OtherWidth { expected, found } => write!(
-                f,
-                "a tree of {found} children per node does not fit one of {expected}"
-            ),
-            Self::NoEngine { level, width } => write!(
-                f,
+            Self::Io { message, .. } => "{message}";
+            Self::OtherKeys { what, id, expected, found } =>
+                "{what} {id} has {found} keys, but needs 1 or {expected}, as everything that moves";
+            Self::OtherVertices { geom_id, key, expected, found } =>
+                "key {key} of mesh {geom_id} has {found} vertices, but key 0 has {expected}";
+            Self::KeyPosition { geom_id, key, vertex, position: [x, y, z] } =>
+                "vertex {vertex} in key {key} of mesh {geom_id} is at ({x}, {y}, {z}): coordinates must be finite and \
+                 below 2^125";
+            Self::KeyTransform { inst_id, key } =>
+                "key {key} of instance {inst_id} must be a finite transform that has an inverse";
+            Self::KeysMirror { inst_id, key } =>
+                "of the keys {key} and {} of instance {inst_id} one mirrors and the other does not", key + 1;
+            Self::OutOfRange { inst_id } =>
+                "the path of instance {inst_id} leaves the range of single precision";
+            Self::Moves(why) => "{why}";
+            Self::OtherTrees { expected, found } =>
+                "a scene that moves needs one tree per span between two keys, {expected} in all, but got {found}";
+            Self::Cancelled => "the build was cancelled";
+            Self::OtherPrimitives { expected, found } =>
+                "a refit needs the {expected} sound primitives of the build, but {found} were found: build again";
+            Self::PrimitiveIsGone { geom_id, prim_id } =>
+                "primitive {prim_id} of geometry {geom_id} is gone or unsound, so the tree cannot be refitted: build again";
+            Self::HasInstances =>
+                "a tree with instances cannot be refitted: place objects in a world and refit those";
+            Self::OtherWidth { expected, found } =>
+                "a tree of {found} children per node does not fit one of {expected}";
+            Self::NoEngine { level, width } =>
                 "level `{level}` traces trees of {} children per node, not {width}; level `scalar` traces all",
-                Width::auto(*level)
-            ),
-            Self::NeedsLog(order) => write!(
-                f,
-                "order `{order}` is learned and needs a log of shadow rays"
-            ),
-            Self::NeedsBoxes(order) => write!(
-                f,
-                "order `{order}` needs a log with box hits, and this one has leaf hits only"
-            ),
-            Self::NeedsMasks(order) => write!(
-                f,
-                "order `{order}` needs a log with the masks of every ray, and this one has sums only"
-            ),
-            Self::OtherTree { expected, found } => write!(
-                f,
-                "a log or order made for {found} does not fit a tree of {expected}"
-            ),
+                Width::auto(*level);
+            Self::NeedsLog(order) => "order `{order}` is learned and needs a log of shadow rays";
+            Self::NeedsBoxes(order) =>
+                "order `{order}` needs a log with box hits, and this one has leaf hits only";
+            Self::NeedsMasks(order) =>
+                "order `{order}` needs a log with the masks of every ray, and this one has sums only";
+            Self::OtherTree { expected, found } =>
+                "a log or order made for {found} does not fit a tree of {expected}";
+        })
+    }
+}
+
+/// Geometries as the end of a text: `: for A, B`.
+struct Listed<'a>(&'a [GeometryId]);
+
+impl fmt::Display for Listed<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, geometry) in self.0.iter().enumerate() {
+            let before = if index == 0 { ": for" } else { "," };
+            write!(f, "{before} {geometry}")?;
         }
+        Ok(())
     }
 }
 
