@@ -7,7 +7,7 @@ use antumbra::{Isa, Width};
 use antumbra_lab::{Machine, count};
 use antumbra_load::{Extent, IntegratorKind, Loaded, MemorySize};
 use antumbra_scene::{Geometry, Light, Material, Projection, Scene};
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::args::{InfoArgs, start_threads};
 use crate::exit::Failure;
@@ -57,25 +57,13 @@ struct Document {
     trees: Vec<TreeInfo>,
 }
 
-/// Materials by kind; one with a bump map counts as what it is without.
-#[derive(Default, Serialize)]
-struct Materials {
-    matte: usize,
-    plastic: usize,
-    mirror: usize,
-    glass: usize,
-    metal: usize,
-    uber: usize,
-    substrate: usize,
-    translucent: usize,
-    fourier: usize,
-    hair: usize,
-    disney: usize,
-    coated: usize,
-    subsurface: usize,
-    mix: usize,
-    metallic: usize,
-    none: usize,
+/// Materials by family; one with a bump map counts as what it is without.
+struct Materials(Vec<(&'static str, usize)>);
+
+impl Serialize for Materials {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().copied())
+    }
 }
 
 /// Lights by kind; an area light is a shape that emits.
@@ -227,35 +215,18 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
 }
 
 fn materials(scene: &Scene) -> Materials {
-    let mut counts = Materials::default();
+    let mut counts: Vec<_> = Material::FAMILIES.iter().map(|name| (*name, 0)).collect();
+    counts.dedup();
     for material in &scene.materials {
-        let unbumped = match material {
-            Material::Bumped { material, .. } | Material::NormalMapped { material, .. } => material,
-            material => material,
+        let family = match material {
+            Material::Bumped(bumped) => bumped.material.family(),
+            Material::NormalMapped(mapped) => mapped.material.family(),
+            material => material.family(),
         };
-        *match unbumped {
-            Material::Matte { .. } => &mut counts.matte,
-            Material::Plastic { .. } => &mut counts.plastic,
-            Material::Mirror { .. } => &mut counts.mirror,
-            Material::Glass { .. } | Material::ThinDielectric { .. } => &mut counts.glass,
-            Material::Metal { .. } => &mut counts.metal,
-            Material::Uber { .. } => &mut counts.uber,
-            Material::Substrate { .. } => &mut counts.substrate,
-            Material::Translucent { .. } => &mut counts.translucent,
-            Material::Fourier(_) => &mut counts.fourier,
-            Material::Hair { .. } => &mut counts.hair,
-            Material::Disney(_) => &mut counts.disney,
-            Material::Subsurface { .. } => &mut counts.subsurface,
-            Material::Mix { .. } => &mut counts.mix,
-            Material::Metallic { .. } => &mut counts.metallic,
-            Material::CoatedDiffuse { .. } | Material::CoatedConductor { .. } => &mut counts.coated,
-            // Bump maps and normal maps are not nested.
-            Material::None | Material::Bumped { .. } | Material::NormalMapped { .. } => {
-                &mut counts.none
-            }
-        } += 1;
+        let found = counts.iter_mut().filter(|(name, _)| *name == family);
+        found.for_each(|(_, count)| *count += 1);
     }
-    counts
+    Materials(counts)
 }
 
 fn lights(scene: &Scene) -> Lights {
@@ -294,32 +265,12 @@ impl CameraInfo {
 }
 
 impl Materials {
+    /// Counts of the first families, which most scenes have, and of others that are present.
     fn text(&self) -> String {
-        let others = [
-            (self.metal, "metal"),
-            (self.uber, "uber"),
-            (self.substrate, "substrate"),
-            (self.translucent, "translucent"),
-            (self.fourier, "fourier"),
-            (self.hair, "hair"),
-            (self.disney, "disney"),
-            (self.coated, "coated"),
-            (self.subsurface, "subsurface"),
-            (self.mix, "mix"),
-            (self.metallic, "metallic"),
-            (self.none, "none"),
-        ];
-        let Self {
-            matte,
-            plastic,
-            mirror,
-            glass,
-            ..
-        } = self;
-        format!(
-            "{matte} matte, {plastic} plastic, {mirror} mirror, {glass} glass{}",
-            present(&others)
-        )
+        let (common, others) = self.0.split_at(4);
+        let common = common.iter().map(|(name, count)| format!("{count} {name}"));
+        let others: Vec<_> = others.iter().map(|(name, count)| (*count, *name)).collect();
+        common.collect::<Vec<_>>().join(", ") + &present(&others)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Loading: from a name to a scene, by its extension.
 
+use antumbra_scene::material::Matte;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -288,10 +289,10 @@ fn plain_mesh(path: &Path, (mesh, note): (TriangleMesh, Option<String>)) -> Load
     let material = if mesh.colors.is_empty() {
         plain_material()
     } else {
-        Material::Matte {
+        Material::Matte(Matte {
             kd: Param::Texture(Arc::new(Texture::VertexColor)),
             sigma: 0.0.into(),
-        }
+        })
     };
     Loaded {
         stage: Some(OwnStage::default()),

@@ -2,6 +2,7 @@
 //!
 //! Directions belong to a stage that looks along -z with y up. [`Up`] turns the stage to the up axis of the mesh.
 
+use antumbra_scene::material::Matte;
 use std::str::FromStr;
 use std::sync::Arc;
 
@@ -346,10 +347,10 @@ pub fn set_ground(scene: &mut Scene, up: Up) {
         ..TriangleMesh::default()
     };
     scene.shapes.push(shape(mesh, scene.materials.len()));
-    scene.materials.push(Material::Matte {
+    scene.materials.push(Material::Matte(Matte {
         kd: Param::Constant(GROUND_COLOR),
         sigma: 0.0.into(),
-    });
+    }));
 }
 
 /// A mesh with a material.

@@ -36,6 +36,7 @@ mod names;
 mod obj;
 mod stl;
 
+use antumbra_scene::material::Matte;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -91,8 +92,8 @@ const PLAIN_GREY: Rgb = Rgb::splat(0.6);
 
 /// Grey of surfaces without a material.
 pub fn plain_material() -> Material {
-    Material::Matte {
+    Material::Matte(Matte {
         kd: PLAIN_GREY.into(),
         sigma: 0.0.into(),
-    }
+    })
 }

@@ -24,14 +24,13 @@ use glam::{DMat4, DVec3};
 
 use crate::budget::Budget;
 use crate::directive::{Directive, Handler};
-use crate::material_key::MaterialKey;
 use crate::mesh_file::PendingMeshes;
 use crate::report::Report;
 use crate::source::Span;
 use crate::state::{BlockKind, State, Transforms};
 use crate::texture::Images;
 use crate::version4;
-use crate::{Options, Times, film, light, material, settings, texture, transform};
+use crate::{Options, Times, film, light, material, parts, settings, texture, transform};
 use blocks::Phase;
 
 /// Message for a singular transformation. [`SINGULAR_HELP`] names the most frequent reason.
@@ -60,7 +59,7 @@ pub(crate) struct Builder<'o> {
     accelerator: Accelerator,
     shapes: Vec<Shape>,
     materials: Vec<Material>,
-    material_indices: HashMap<MaterialKey, usize>,
+    material_indices: HashMap<Vec<parts::Word>, usize>,
     media: Vec<Medium>,
     /// Current medium of each name.
     media_indices: HashMap<String, u32>,

@@ -31,7 +31,7 @@
 //! - `state`, `builder`: the graphics state, and the scene under construction
 //! - `budget`, `parts`: limits on memory, and on nested textures and materials
 //! - `camera`, `film`, `settings`, `light`, `material`, `texture`, `shape`: one group of directives each
-//! - `material_key`: equality of materials;  `named_spectra`: metals, glasses and illuminants by name
+//! - `named_spectra`: metals, glasses and illuminants by name
 //! - `version4`: scenes of pbrt-v4
 //! - `transform`, `spectrum`: matrices and colours as pbrt-v3 defines them
 //! - `ply`, `mesh_file`: PLY meshes, and meshes that scenes name;  `bsdf_file`: tables of scattering
@@ -48,7 +48,6 @@ mod lexer;
 mod light;
 mod lookup;
 mod material;
-mod material_key;
 mod medium;
 mod mesh_file;
 mod named_spectra;

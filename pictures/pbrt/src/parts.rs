@@ -1,8 +1,11 @@
-//! Limits on nested textures and mixed materials.
+//! Parts of textures and materials: limits on their number, and keys by which equal materials are found.
 //!
 //! A few lines, each of which names the line before twice, describe exponentially many parts. Many lines, each of
 //! which names the line before once, are nested deeper than the call stack allows. Every texture and mixture is
 //! therefore counted when it is defined, so later code can use recursion.
+
+use std::mem::{Discriminant, discriminant};
+use std::sync::Arc;
 
 use antumbra_scene::{Material, MaterialPart, Param, Texture};
 
@@ -66,4 +69,42 @@ fn count_material(material: &Material, left: &mut usize) -> bool {
         MaterialPart::Material(material) => count_material(material, left),
         _ => true,
     })
+}
+
+/// Word of the key of a material.
+#[derive(PartialEq, Eq, Hash)]
+pub(crate) enum Word {
+    Kind(Discriminant<Material>),
+    Number(u32),
+    Color([u32; 3]),
+    /// Address of a texture or a table.
+    Shared(usize),
+}
+
+/// Appends what equal materials have in common: numbers by their bits, textures by identity.
+///
+/// A key is valid while the textures of its material live, which the scene's list of materials guarantees. Two
+/// declarations of one texture count as different textures.
+pub(crate) fn push_key(material: &Material, key: &mut Vec<Word>) {
+    key.push(Word::Kind(discriminant(material)));
+    for part in material.parts() {
+        key.push(match part {
+            MaterialPart::Material(material) => {
+                push_key(material, key);
+                continue;
+            }
+            MaterialPart::Setting(number) => Word::Number(number.to_bits()),
+            MaterialPart::Number(Param::Constant(number)) => Word::Number(number.to_bits()),
+            MaterialPart::Color(Param::Constant(color)) => {
+                Word::Color(color.to_array().map(f32::to_bits))
+            }
+            MaterialPart::Table(table) => Word::Shared(Arc::as_ptr(table).addr()),
+            MaterialPart::Number(Param::Texture(texture)) => {
+                Word::Shared(Arc::as_ptr(texture).addr())
+            }
+            MaterialPart::Color(Param::Texture(texture)) => {
+                Word::Shared(Arc::as_ptr(texture).addr())
+            }
+        });
+    }
 }

@@ -45,6 +45,51 @@ impl Column3 {
     }
 }
 
+/// Declares structs of columns, and zeros as their defaults: the standard library has none for long arrays.
+macro_rules! columns {
+    ($($(#[$meta:meta])* $pub:vis struct $Name:ident { $($(#[$field_meta:meta])* $field_pub:vis $field:ident: $Type:ty,)* })*) => {
+        $($(#[$meta])*
+        $pub struct $Name { $($(#[$field_meta])* $field_pub $field: $Type,)* }
+
+        impl Default for $Name {
+            fn default() -> Self {
+                Self { $($field: $crate::columns::Zero::zero(),)* }
+            }
+        }
+
+        impl $crate::columns::Zero for $Name {
+            fn zero() -> Self {
+                Self::default()
+            }
+        })*
+    };
+}
+pub(crate) use columns;
+
+/// Value before a block is computed.
+pub trait Zero {
+    /// The value.
+    fn zero() -> Self;
+}
+
+impl<T: Zero, const N: usize> Zero for [T; N] {
+    fn zero() -> Self {
+        std::array::from_fn(|_| T::zero())
+    }
+}
+
+macro_rules! zero {
+    ($($Type:ty)*) => {
+        $(impl Zero for $Type {
+            fn zero() -> Self {
+                Self::default()
+            }
+        })*
+    };
+}
+
+zero!(f32 f64 u32 bool Column3);
+
 /// `a` if `first`, else `b`, without a branch.
 #[inline(always)]
 pub fn select(first: bool, a: Vec3, b: Vec3) -> Vec3 {

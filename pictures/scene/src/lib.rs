@@ -16,7 +16,7 @@
 //! - [`flatten`]: scenes without instances, for users who trace none
 //! - [`transform`]: transformations of points and normals
 //! - [`texture`]: values that vary over surfaces, and images
-//! - [`material`], [`disney`], [`fourier`], [`light`], [`camera`], [`film`]: scattering, parameters and tables of it,
+//! - [`material`], [`fourier`], [`light`], [`camera`], [`film`]: scattering, parameters and tables of it,
 //!   emission, viewpoint and picture
 //! - [`medium`]: volumes that absorb and scatter light
 //! - [`settings`]: integrator, sampler and accelerator
@@ -39,7 +39,6 @@
 pub mod builtin;
 pub mod camera;
 pub mod curve;
-pub mod disney;
 pub mod film;
 pub mod flatten;
 pub mod fourier;
@@ -55,13 +54,12 @@ pub mod transform;
 
 pub use camera::{Camera, LensElement, LensSystem, Projection};
 pub use curve::{CurveProfile, Curves};
-pub use disney::{Disney, DisneyBody};
 pub use film::{Film, Filter};
 pub use flatten::{Error, MAX_FLAT_TRIANGLES};
 pub use fourier::FourierTable;
 pub use instance::{Instance, Object};
 pub use light::{Environment, EnvironmentMapping, Light};
-pub use material::{Interior, Material, MaterialPart, Pigment};
+pub use material::{DisneyBody, Interior, Material, MaterialPart, Pigment};
 pub use medium::{DensityGrid, Medium, MediumInterface};
 pub use settings::{Accelerator, DirectStrategy, Integrator, LightStrategy, Sampler, SamplerKind};
 pub use shape::{AreaLight, Geometry, Shape, Sphere, TriangleMesh};

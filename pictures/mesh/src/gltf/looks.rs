@@ -10,6 +10,7 @@
 //! | emission | an area light with a texture |
 //! | occlusion | none: light is traced |
 
+use antumbra_scene::material::{Glass, Metallic, Mix, NormalMapped};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -267,13 +268,13 @@ impl Surface<'_, '_> {
                     .note("textures of KHR_materials_specular are left out");
             }
         }
-        let mut opaque = Material::Metallic {
+        let mut opaque = Material::Metallic(Metallic {
             color: color.clone(),
             metallic,
             roughness: roughness.clone(),
             coat: coat.into(),
             transmission: 0.0.into(),
-        };
+        });
         let Some(clear) = material.transmission() else {
             return opaque;
         };
@@ -296,7 +297,7 @@ impl Surface<'_, '_> {
                     "light that passes through thin sheets is not blurred by their roughness",
                 );
             }
-            if let Material::Metallic { transmission, .. } = &mut opaque {
+            if let Material::Metallic(Metallic { transmission, .. }) = &mut opaque {
                 *transmission = share;
             }
             return opaque;
@@ -309,26 +310,26 @@ impl Surface<'_, '_> {
             Param::Constant(value) => Param::Constant(value * value),
             texture => Param::Texture(Arc::new(Texture::Scale([texture.clone(), texture.clone()]))),
         };
-        let glass = Material::Glass {
+        let glass = Material::Glass(Glass {
             kr: Rgb::ONE.into(),
             kt: color,
             eta: eta.max(1.0).into(),
             roughness: [alpha.clone(), alpha],
             remap_roughness: false,
-        };
+        });
         match share {
             Param::Constant(share) if share >= 1.0 => glass,
-            Param::Constant(share) => Material::Mix {
+            Param::Constant(share) => Material::Mix(Mix {
                 materials: [Arc::new(glass), Arc::new(opaque)],
                 amount: Rgb::splat(share).into(),
-            },
+            }),
             Param::Texture(_) => {
                 self.looks
                     .note("textures of transmission are left out where there is a volume");
-                Material::Mix {
+                Material::Mix(Mix {
                     materials: [Arc::new(glass), Arc::new(opaque)],
                     amount: Rgb::splat(factor).into(),
-                }
+                })
             }
         }
     }
@@ -342,11 +343,11 @@ impl Surface<'_, '_> {
         else {
             return made;
         };
-        Material::NormalMapped {
+        Material::NormalMapped(NormalMapped {
             material: Arc::new(made),
             normal: loaded.raw(laid),
             scale: normal.scale(),
-        }
+        })
     }
 
     fn emission(&mut self, material: &gltf::Material) -> Option<AreaLight> {

@@ -1,5 +1,6 @@
 //! Generated files: valid ones in every packing, and one for every mistake.
 
+use antumbra_scene::material::{Metallic, NormalMapped};
 use antumbra_scene::{Geometry, Material, Param, Rgb, Texture};
 use glam::Vec3;
 
@@ -91,9 +92,9 @@ fn the_same_scene_in_every_packing() {
         let (shapes, materials) = (&model.shapes, &model.materials);
         assert_eq!(shapes.len(), 2, "lines are no shape");
         assert_eq!(materials.len(), 2);
-        let Material::Metallic {
+        let Material::Metallic(Metallic {
             color, metallic, ..
-        } = &materials[0]
+        }) = &materials[0]
         else {
             panic!("{:?}", materials[0]);
         };
@@ -426,21 +427,21 @@ fn all_kinds_of_textures_are_read() {
         ]
     );
     let with = |wanted: fn(&Material) -> bool| model.materials.iter().filter(|m| wanted(m)).count();
-    assert_eq!(with(|m| matches!(m, Material::NormalMapped { .. })), 1);
-    assert_eq!(with(|m| matches!(m, Material::Glass { .. })), 1);
+    assert_eq!(with(|m| matches!(m, Material::NormalMapped(_))), 1);
+    assert_eq!(with(|m| matches!(m, Material::Glass(_))), 1);
     let mapped = model.materials.iter().find_map(|material| match material {
-        Material::NormalMapped {
+        Material::NormalMapped(NormalMapped {
             material, scale, ..
-        } => Some((&**material, *scale)),
+        }) => Some((&**material, *scale)),
         _ => None,
     });
     let Some((
-        Material::Metallic {
+        Material::Metallic(Metallic {
             color,
             metallic,
             roughness,
             ..
-        },
+        }),
         scale,
     )) = mapped
     else {
@@ -563,7 +564,7 @@ fn missing_images_are_warnings_with_their_material() {
     };
     let start = "material 0: image 0: no.png: ";
     assert!(warning.text.starts_with(start), "{warning:?}");
-    let Material::Metallic { color, .. } = &model.materials[0] else {
+    let Material::Metallic(Metallic { color, .. }) = &model.materials[0] else {
         panic!("{:?}", model.materials);
     };
     assert_eq!(color.constant(), Some(&Rgb::splat(0.6)), "plain grey");

@@ -17,6 +17,7 @@
 //! that `Ks .5` is the coat of an index of refraction of 1.5, and `Ks 1` twice that. Blender reads `Ks` in the same way.
 //! Light that the coat does not reflect reaches the base, so that no energy is gained and little is lost.
 
+use antumbra_scene::material::{Glass, Matte, Metallic, NormalMapped, Substrate};
 use std::sync::Arc;
 
 use antumbra_scene::{
@@ -61,10 +62,10 @@ impl Looks {
 
     /// Diffuse in the colours of the vertices.
     pub fn of_vertex_colors() -> Self {
-        Self::plain(Material::Matte {
+        Self::plain(Material::Matte(Matte {
             kd: Param::Texture(Arc::new(Texture::VertexColor)),
             sigma: 0.0.into(),
-        })
+        }))
     }
 
     /// Look by a material of a library. Missing images are warnings, damaged ones mistakes.
@@ -107,22 +108,22 @@ impl Looks {
             let metallic = maps.number(mtl.map_metallic.as_ref(), mtl.metallic.unwrap_or(1.0));
             let eta = mtl.ni.filter(|&eta| eta > 1.0).unwrap_or(1.5);
             let coat = (eta - 1.0) / (eta + 1.0);
-            Material::Metallic {
+            Material::Metallic(Metallic {
                 color: kd,
                 metallic: metallic.unwrap_or(mtl.metallic.unwrap_or(0.0).into()),
                 roughness: roughness.unwrap_or(mtl.roughness.unwrap_or(0.5).into()),
                 coat: Rgb::splat(coat * coat).into(),
                 transmission: 0.0.into(),
-            }
+            })
         } else if matches!(illum, Some(4 | 6 | 7 | 9)) {
             is_clear = true;
-            Material::Glass {
+            Material::Glass(Glass {
                 kr: Rgb::ONE.into(),
                 kt: mtl.tf.unwrap_or(Rgb::ONE).into(),
                 eta: mtl.ni.filter(|&eta| eta > 0.0).unwrap_or(1.5).into(),
                 roughness: [0.0.into(), 0.0.into()],
                 remap_roughness: false,
-            }
+            })
         } else if ks.max_element() > 0.0 && !matches!(illum, Some(0 | 1)) {
             let ks = ks.clamp(Rgb::ZERO, Rgb::ONE);
             let is_mirror = matches!(illum, Some(3 | 5 | 8));
@@ -133,32 +134,32 @@ impl Looks {
             };
             let alpha = alpha_of_exponent(mtl.ns.unwrap_or(usual));
             if is_mirror {
-                Material::Substrate {
+                Material::Substrate(Substrate {
                     kd,
                     ks: times(ks, Rgb::ONE, map_ks),
                     roughness: [alpha.into(), alpha.into()],
                     remap_roughness: false,
-                }
+                })
             } else {
                 let is_metal = kd.constant() == Some(&Rgb::ZERO) && ks.max_element() > METAL;
                 let (color, coat) = match is_metal {
                     true => (times(ks, Rgb::ONE, map_ks), Param::Constant(Rgb::ZERO)),
                     false => (kd, times(COAT * ks, Rgb::ONE, map_ks)),
                 };
-                Material::Metallic {
+                Material::Metallic(Metallic {
                     color,
                     metallic: f32::from(u8::from(is_metal)).into(),
                     // Perceptual roughness, whose square is alpha.
                     roughness: alpha.sqrt().into(),
                     coat,
                     transmission: 0.0.into(),
-                }
+                })
             }
         } else {
-            Material::Matte {
+            Material::Matte(Matte {
                 kd,
                 sigma: 0.0.into(),
-            }
+            })
         };
         if let Some(kind) = illum.filter(|&kind| kind > 9) {
             model.note(format!("`illum {kind}` is taken as `illum 2`"));
@@ -265,11 +266,11 @@ impl Maps<'_> {
             };
             (Param::Texture(Arc::new(Texture::Image(texture))), strength)
         };
-        Material::NormalMapped {
+        Material::NormalMapped(NormalMapped {
             material: Arc::new(material),
             normal,
             scale,
-        }
+        })
     }
 }
 

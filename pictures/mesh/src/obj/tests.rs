@@ -1,5 +1,6 @@
 //! Files with every statement, and one for every mistake.
 
+use antumbra_scene::material::{Matte, Metallic, NormalMapped, Substrate};
 use antumbra_scene::{Material, Param, Texture};
 use glam::DVec3;
 
@@ -77,7 +78,7 @@ fn vertex_colours_are_kept() {
     let colors = &mesh(&model.shapes[0]).colors;
     assert_eq!(colors[0], glam::Vec3::X);
     assert!((colors[2].z - 0.214_041).abs() < 1e-5, "{colors:?}");
-    let Material::Matte { kd, .. } = &model.materials[0] else {
+    let Material::Matte(Matte { kd, .. }) = &model.materials[0] else {
         panic!("not diffuse");
     };
     assert!(kd.constant().is_none());
@@ -257,8 +258,8 @@ fn warned(files: &[(&str, &[u8])]) -> (String, Material) {
 /// Diffuse colour of a material without an image.
 fn diffuse(material: &Material) -> [f32; 3] {
     let kd = match material {
-        Material::Matte { kd, .. } => kd,
-        Material::Metallic { color, .. } => color,
+        Material::Matte(Matte { kd, .. }) => kd,
+        Material::Metallic(Metallic { color, .. }) => color,
         other => panic!("{other:?}"),
     };
     kd.constant().expect("no image").to_array()
@@ -353,13 +354,13 @@ fn highlights_lie_over_the_diffuse_colour() {
         (7.0, "Ns 1000", "illum 2"),
     ] {
         let text = format!("Kd .8 .05 .05\nKs {ks} {ks} {ks}\n{ns}\n{illum}\n");
-        let Material::Metallic {
+        let Material::Metallic(Metallic {
             color,
             metallic,
             roughness,
             coat,
             transmission,
-        } = material(&text).0
+        }) = material(&text).0
         else {
             panic!("{text}");
         };
@@ -380,7 +381,7 @@ fn highlights_lie_over_the_diffuse_colour() {
     }
     for illum in ["illum 0", "illum 1"] {
         let (found, ..) = material(&format!("Kd .8 .05 .05\nKs 1 1 1\n{illum}"));
-        assert!(matches!(found, Material::Matte { .. }), "{found:?}");
+        assert!(matches!(found, Material::Matte(_)), "{found:?}");
     }
 }
 
@@ -388,7 +389,7 @@ fn highlights_lie_over_the_diffuse_colour() {
 fn mirrors_and_metals_are_in_the_colour_of_the_highlight() {
     for illum in [3, 5, 8] {
         let (found, ..) = material(&format!("Kd .1\nKs .9 .8 .7\nillum {illum}"));
-        let Material::Substrate { ks, roughness, .. } = found else {
+        let Material::Substrate(Substrate { ks, roughness, .. }) = found else {
             panic!("{found:?}");
         };
         assert_eq!(ks.constant(), Some(&glam::Vec3::new(0.9, 0.8, 0.7)));
@@ -398,9 +399,9 @@ fn mirrors_and_metals_are_in_the_colour_of_the_highlight() {
     for (ks, metal) in [([0.9, 0.8, 0.3], 1.0), ([0.5; 3], 0.0)] {
         let [r, g, b] = ks;
         let (found, ..) = material(&format!("Kd 0 0 0\nKs {r} {g} {b}\nillum 2"));
-        let Material::Metallic {
+        let Material::Metallic(Metallic {
             color, metallic, ..
-        } = found
+        }) = found
         else {
             panic!("{found:?}");
         };
@@ -413,7 +414,7 @@ fn mirrors_and_metals_are_in_the_colour_of_the_highlight() {
 #[test]
 fn an_image_over_black_is_the_image() {
     let textured = |material: &Material| match material {
-        Material::Metallic { color, .. } => match color {
+        Material::Metallic(Metallic { color, .. }) => match color {
             Param::Texture(texture) => matches!(&**texture, Texture::Image(_)),
             Param::Constant(_) => false,
         },
@@ -471,29 +472,29 @@ fn statements_of_libraries_become_materials() {
     let [dull, shiny, glass, _, gold] = &model.materials[..] else {
         panic!("{} materials", model.materials.len());
     };
-    let Material::Matte { kd, .. } = dull else {
+    let Material::Matte(Matte { kd, .. }) = dull else {
         panic!("{dull:?}");
     };
     assert_eq!(kd.constant(), Some(&glam::Vec3::new(0.9, 0.05, 0.05)));
-    let Material::Metallic { roughness, .. } = shiny else {
+    let Material::Metallic(Metallic { roughness, .. }) = shiny else {
         panic!("{shiny:?}");
     };
     // The exponent 98 is alpha sqrt(2 / 100), the square of the roughness.
     let roughness = roughness.constant().expect("a number");
     assert!((roughness * roughness - 0.141_421).abs() < 1e-5);
     assert!(model.shapes[1].alpha.is_some() && model.shapes[0].alpha.is_none());
-    assert!(matches!(glass, Material::Glass { .. }));
+    assert!(matches!(glass, Material::Glass(_)));
     assert!(model.shapes[2].alpha.is_none(), "clear by its material");
     let lamp = model.shapes[3].area_light.as_ref().expect("a lamp");
     assert_eq!(lamp.radiance, glam::Vec3::new(3.0, 2.0, 1.0));
     assert!(lamp.texture.is_some());
-    let Material::NormalMapped {
+    let Material::NormalMapped(NormalMapped {
         material, scale, ..
-    } = gold
+    }) = gold
     else {
         panic!("{gold:?}");
     };
-    assert!(matches!(**material, Material::Metallic { .. }));
+    assert!(matches!(**material, Material::Metallic(_)));
     assert_eq!(*scale, 0.5);
     // The mask is the alpha channel, 128 of 255.
     let Some(Param::Texture(mask)) = &model.shapes[4].alpha else {

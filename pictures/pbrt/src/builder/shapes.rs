@@ -10,13 +10,12 @@ use glam::{DMat4, DVec3};
 use super::{Builder, SINGULAR, SINGULAR_HELP};
 use crate::directive::Quoted;
 use crate::lookup::Lookup;
-use crate::material_key::MaterialKey;
 use crate::params::Params;
 use crate::report::Report;
 use crate::shape::Source;
 use crate::source::Span;
 use crate::texture::Textured;
-use crate::{material, shape, suggest, transform};
+use crate::{material, parts, shape, suggest, transform};
 
 impl Builder<'_> {
     pub(super) fn shape(&mut self, at: Span, kind: &Quoted, params: &Params, report: &mut Report) {
@@ -148,13 +147,12 @@ impl Builder<'_> {
 
     /// Index of a material in the scene. New materials are added.
     pub(super) fn material_index(&mut self, material: Material) -> usize {
-        *self
-            .material_indices
-            .entry(MaterialKey::new(&material))
-            .or_insert_with(|| {
-                self.materials.push(material);
-                self.materials.len() - 1
-            })
+        let mut key = Vec::new();
+        parts::push_key(&material, &mut key);
+        *self.material_indices.entry(key).or_insert_with(|| {
+            self.materials.push(material);
+            self.materials.len() - 1
+        })
     }
 }
 

@@ -1,5 +1,6 @@
 //! Materials `subsurface` and `kdsubsurface`.
 
+use antumbra_scene::material::Subsurface;
 use antumbra_scene::{Interior, Material, Param, Rgb};
 
 use super::{remap_roughness, roughness_along};
@@ -60,18 +61,18 @@ fn body(values: &mut Textured, interior: Interior, asymmetry: f32) -> Material {
         values.lookup.at,
         "subsurface scattering is rendered by walks inside of shapes, which must be closed",
     );
-    Material::Subsurface {
+    Material::Subsurface(Subsurface {
         kr: values.param("Kr", 1.0),
         kt: values.param("Kt", 1.0),
         eta,
-        roughness: roughness_along(values, 0.0),
+        roughness: roughness_along(values),
         remap_roughness: remap_roughness(values),
         interior,
         asymmetry,
-    }
+    })
 }
 
-fn color(values: &mut Textured, name: &'static str, default: Rgb) -> Param<Rgb> {
+pub(super) fn color(values: &mut Textured, name: &'static str, default: Rgb) -> Param<Rgb> {
     let found = values.find(name);
     found.map_or(Param::Constant(default), |(value, _)| value)
 }

@@ -2,9 +2,14 @@
 
 use std::sync::Arc;
 
+use antumbra_scene::material::{
+    CoatedConductor, CoatedDiffuse, Glass, Limit, Matte, Metal, Metallic, ThinDielectric,
+    Translucent,
+};
 use antumbra_scene::{Material, Param, Rgb, Texture};
 
-use super::{color, optional_roughness};
+use super::optional_roughness;
+use super::subsurface::color;
 use crate::named_spectra;
 use crate::params::{ParamType, Values};
 use crate::spectrum;
@@ -31,21 +36,21 @@ pub(crate) const UNSUPPORTED: &[&str] = &["measured"];
 /// Reads a material by its name. `None`: the name is not in [`SUPPORTED`].
 pub(super) fn build(name: &str, values: &mut Textured) -> Option<Material> {
     Some(match name {
-        "diffuse" => Material::Matte {
+        "diffuse" => Material::Matte(Matte {
             kd: values.param("reflectance", 0.5),
             sigma: 0.0.into(),
-        },
+        }),
         "diffusetransmission" => diffuse_transmission(values),
-        "dielectric" => Material::Glass {
+        "dielectric" => Material::Glass(Glass {
             kr: Rgb::ONE.into(),
             kt: Rgb::ONE.into(),
             eta: index(values, "eta"),
             roughness: alphas(values, ["roughness", "uroughness", "vroughness"], 0.0),
             remap_roughness: false,
-        },
-        "thindielectric" => Material::ThinDielectric {
+        }),
+        "thindielectric" => Material::ThinDielectric(ThinDielectric {
             eta: index(values, "eta"),
-        },
+        }),
         "conductor" => {
             let alphas = alphas(values, ["roughness", "uroughness", "vroughness"], 0.0);
             conductor(values, alphas)
@@ -59,27 +64,20 @@ pub(super) fn build(name: &str, values: &mut Textured) -> Option<Material> {
 /// Diffuse light on both sides. Together they must not gain energy, which pbrt-v4 does not check.
 fn diffuse_transmission(values: &mut Textured) -> Material {
     let scale = values.lookup.float("scale", 1.0, values.report);
-    Material::Translucent {
+    Material::Translucent(Translucent {
         kd: Rgb::splat(scale).into(),
         ks: Rgb::ZERO.into(),
         reflect: values.param("reflectance", 0.25),
         transmit: values.param("transmittance", 0.25),
         roughness: 0.0.into(),
         remap_roughness: false,
-    }
+    })
 }
 
 /// Index of refraction: a number, a glass by its name, or a spectrum, which then has one index for all colours.
 fn index(values: &mut Textured, name: &'static str) -> Param<f32> {
-    if let Some((eta, span)) = values.find::<f32>(name) {
-        if let Param::Constant(number) = eta
-            && !(number > 0.0)
-        {
-            let message = format!("the index of refraction must be positive, found {number}");
-            values.report.error(span, message);
-            return 1.5.into();
-        }
-        return eta;
+    if values.find::<f32>(name).is_some() {
+        return values.limited(name, Limit::Index).unwrap_or(1.5.into());
     }
     let Some(param) = values.lookup.find(name, &[ParamType::Spectrum]) else {
         return 1.5.into();
@@ -129,7 +127,7 @@ fn root(value: Param<f32>) -> Param<f32> {
 /// Spectrum of a metal. The default is copper.
 fn metal(values: &mut Textured, name: &'static str, copper: &str) -> Param<Rgb> {
     let default = super::named_color(copper);
-    color(values, name, default.to_array())
+    color(values, name, default)
 }
 
 fn conductor(values: &mut Textured, roughness: [Param<f32>; 2]) -> Material {
@@ -148,26 +146,26 @@ fn conductor(values: &mut Textured, roughness: [Param<f32>; 2]) -> Material {
                  along u",
             );
             let [u, _] = roughness;
-            Material::Metallic {
+            Material::Metallic(Metallic {
                 color: Param::Texture(texture),
                 metallic: 1.0.into(),
                 roughness: root(u),
                 coat: Rgb::ZERO.into(),
                 transmission: 0.0.into(),
-            }
+            })
         }
-        Some((Param::Constant(reflectance), _)) => Material::Metal {
+        Some((Param::Constant(reflectance), _)) => Material::Metal(Metal {
             eta: Rgb::ONE.into(),
             k: absorption_of(reflectance).into(),
             roughness,
             remap_roughness: false,
-        },
-        None => Material::Metal {
+        }),
+        None => Material::Metal(Metal {
             eta: metal(values, "eta", "metal-Cu-eta"),
             k: metal(values, "k", "metal-Cu-k"),
             roughness,
             remap_roughness: false,
-        },
+        }),
     }
 }
 
@@ -211,11 +209,11 @@ fn coated_diffuse(values: &mut Textured) -> Material {
             u
         }
     };
-    Material::CoatedDiffuse {
+    Material::CoatedDiffuse(CoatedDiffuse {
         reflectance: values.param("reflectance", 0.5),
         eta: index(values, "eta"),
         roughness,
-    }
+    })
 }
 
 fn coated_conductor(values: &mut Textured) -> Material {
@@ -249,11 +247,11 @@ fn coated_conductor(values: &mut Textured) -> Material {
             metal(values, "conductor.k", "metal-Cu-k"),
         ),
     };
-    Material::CoatedConductor {
+    Material::CoatedConductor(CoatedConductor {
         eta,
         k,
         roughness,
         coat_eta,
         coat_roughness,
-    }
+    })
 }

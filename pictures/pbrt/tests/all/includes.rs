@@ -19,7 +19,7 @@ fn included_files_continue_the_scene() {
     assert!(scene.shapes[0].reverse_orientation);
     assert!(matches!(
         scene.materials[0],
-        antumbra_scene::Material::Mirror { .. }
+        antumbra_scene::Material::Mirror(_)
     ));
 }
 

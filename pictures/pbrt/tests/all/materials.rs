@@ -1,6 +1,10 @@
 //! Materials: parameters and defaults of pbrt-v3.
 
-use antumbra_scene::{Disney, DisneyBody, Material, Param, Rgb, Scene};
+use antumbra_scene::material::Disney;
+use antumbra_scene::material::{
+    Bumped, Hair, Matte, Metal, Mirror, Mix, Substrate, Subsurface, Translucent, Uber,
+};
+use antumbra_scene::{DisneyBody, Material, Param, Rgb, Scene};
 
 use super::{load_text, tolerated, world};
 
@@ -32,17 +36,17 @@ fn defaults() {
         ("", Material::None),
         (
             "metal",
-            Material::Metal {
+            Material::Metal(Metal {
                 // Copper.
                 eta: Rgb::new(0.200438, 0.924033, 1.102212).into(),
                 k: Rgb::new(3.912949, 2.452848, 2.142188).into(),
                 roughness: both(0.01),
                 remap_roughness: true,
-            },
+            }),
         ),
         (
             "uber",
-            Material::Uber {
+            Material::Uber(Uber {
                 kd: grey(0.25),
                 ks: grey(0.25),
                 kr: grey(0.0),
@@ -51,27 +55,27 @@ fn defaults() {
                 opacity: grey(1.0),
                 eta: 1.5.into(),
                 remap_roughness: true,
-            },
+            }),
         ),
         (
             "substrate",
-            Material::Substrate {
+            Material::Substrate(Substrate {
                 kd: grey(0.5),
                 ks: grey(0.5),
                 roughness: both(0.1),
                 remap_roughness: true,
-            },
+            }),
         ),
         (
             "translucent",
-            Material::Translucent {
+            Material::Translucent(Translucent {
                 kd: grey(0.25),
                 ks: grey(0.25),
                 reflect: grey(0.5),
                 transmit: grey(0.5),
                 roughness: 0.1.into(),
                 remap_roughness: true,
-            },
+            }),
         ),
     ] {
         assert_eq!(material(&format!("Material {name:?}")), expected, "{name}");
@@ -102,9 +106,9 @@ fn roughness_along_one_direction() {
         ("substrate", r#""float vroughness" .2"#, [0.1, 0.2]),
     ] {
         let material = material(&format!("Material \"{kind}\" {parameters}"));
-        let (Material::Metal { roughness, .. }
-        | Material::Uber { roughness, .. }
-        | Material::Substrate { roughness, .. }) = material
+        let (Material::Metal(Metal { roughness, .. })
+        | Material::Uber(Uber { roughness, .. })
+        | Material::Substrate(Substrate { roughness, .. })) = material
         else {
             panic!("{material:?}")
         };
@@ -122,25 +126,25 @@ fn bump_maps_tilt_what_they_are_given_to() {
     let bumped = material(&format!(
         "{height} Material \"mirror\" \"texture bumpmap\" \"h\""
     ));
-    let Material::Bumped {
+    let Material::Bumped(Bumped {
         material: inner,
         height: Param::Texture(_),
-    } = bumped
+    }) = bumped
     else {
         panic!("{bumped:?}")
     };
-    assert_eq!(*inner, Material::Mirror { kr: grey(0.9) });
+    assert_eq!(*inner, Material::Mirror(Mirror { kr: grey(0.9) }));
     // A constant height does not tilt normals.
     let flat = material(&format!(
         "{height} Material \"mirror\" \"texture bumpmap\" \"flat\""
     ));
-    assert_eq!(flat, Material::Mirror { kr: grey(0.9) });
+    assert_eq!(flat, Material::Mirror(Mirror { kr: grey(0.9) }));
     // Bump map of the shape's own parameters.
     let scene = world(&format!(
         "{height} Material \"mirror\" {TRIANGLE} \"texture bumpmap\" \"h\" {TRIANGLE}"
     ));
-    assert!(matches!(of_shape(&scene, 0), Material::Bumped { .. }));
-    assert!(matches!(of_shape(&scene, 1), Material::Mirror { .. }));
+    assert!(matches!(of_shape(&scene, 0), Material::Bumped(_)));
+    assert!(matches!(of_shape(&scene, 1), Material::Mirror(_)));
 }
 
 #[test]
@@ -149,36 +153,36 @@ fn mixtures_are_of_named_materials_and_bumped_as_a_whole() {
         MakeNamedMaterial "plain" "string type" "matte"
         MakeNamedMaterial "bumpy" "string type" "mirror" "texture bumpmap" "h"
         Material "mix" "rgb amount" [1 0 0]"#;
-    let matte = Material::Matte {
+    let matte = Material::Matte(Matte {
         kd: grey(0.5),
         sigma: 0.0.into(),
-    };
-    let mirror = Material::Mirror { kr: grey(0.9) };
+    });
+    let mirror = Material::Mirror(Mirror { kr: grey(0.9) });
     let mixed = |first: &str, second: &str| {
         material(&format!(
             "{named} \"string namedmaterial1\" \"{first}\" \"string namedmaterial2\" \"{second}\""
         ))
     };
-    let Material::Bumped {
+    let Material::Bumped(Bumped {
         material: inner, ..
-    } = mixed("bumpy", "plain")
+    }) = mixed("bumpy", "plain")
     else {
         panic!()
     };
     assert_eq!(
         *inner,
-        Material::Mix {
+        Material::Mix(Mix {
             materials: [mirror.clone().into(), matte.clone().into()],
             amount: Rgb::X.into()
-        }
+        })
     );
     // The bump map of the second material is ignored, as in pbrt-v3.
     assert_eq!(
         mixed("plain", "bumpy"),
-        Material::Mix {
+        Material::Mix(Mix {
             materials: [matte.into(), mirror.into()],
             amount: Rgb::X.into()
-        }
+        })
     );
 }
 
@@ -210,12 +214,12 @@ fn subsurface_scattering_has_the_defaults_of_pbrt() {
     .scene;
     let found: Vec<_> = (scene.materials.iter())
         .map(|material| match material {
-            Material::Subsurface {
+            Material::Subsurface(Subsurface {
                 interior,
                 eta,
                 asymmetry,
                 ..
-            } => (interior.clone(), *eta, *asymmetry),
+            }) => (interior.clone(), *eta, *asymmetry),
             other => panic!("{other:?}"),
         })
         .collect();
@@ -258,11 +262,13 @@ fn hair_has_the_defaults_of_pbrt() {
     ))
     .unwrap()
     .scene;
-    let hair = |pigment, eta: f32, roughness: [f32; 2], tilt: f32| Material::Hair {
-        pigment,
-        eta: eta.into(),
-        roughness: roughness.map(Param::Constant),
-        tilt: tilt.into(),
+    let hair = |pigment, eta: f32, roughness: [f32; 2], tilt: f32| {
+        Material::Hair(Hair {
+            pigment,
+            eta: eta.into(),
+            roughness: roughness.map(Param::Constant),
+            tilt: tilt.into(),
+        })
     };
     let melanin = |amounts: [f32; 2]| Pigment::Melanin(amounts.map(Param::Constant));
     assert_eq!(
@@ -283,7 +289,7 @@ fn hair_has_the_defaults_of_pbrt() {
 /// Material of a `disney` of the given parameters.
 fn disney(parameters: &str) -> Disney {
     match material(&format!("Material \"disney\" {parameters}")) {
-        Material::Disney(disney) => *disney,
+        Material::Disney(disney) => disney,
         other => panic!("{other:?}"),
     }
 }

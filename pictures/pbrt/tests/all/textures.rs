@@ -1,5 +1,6 @@
 //! Textures, the images they look up, and alpha masks.
 
+use antumbra_scene::material::Matte;
 use std::sync::Arc;
 
 use antumbra_image::{Image as Picture, Window};
@@ -19,7 +20,7 @@ const PFM: &[u8] = b"Pf 2 1 -1\n\0\0\0\0\0\0\x80\x3f";
 /// Diffuse colour of a matte material.
 fn kd(scene: &Scene, material: usize) -> &Param<Rgb> {
     match &scene.materials[material] {
-        Material::Matte { kd, .. } => kd,
+        Material::Matte(Matte { kd, .. }) => kd,
         other => panic!("{other:?}"),
     }
 }
@@ -170,7 +171,7 @@ property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_he
         ("m.ply", ply),
     ]);
     let scene = result.unwrap().scene;
-    let Material::Matte { sigma, .. } = &scene.materials[0] else {
+    let Material::Matte(Matte { sigma, .. }) = &scene.materials[0] else {
         panic!()
     };
     let image = |texture: &Texture<f32>| match texture {

@@ -1,6 +1,7 @@
 //! Scenes of pbrt-v4 against the scenes of version 3 that mean the same.
 
 use antumbra_pbrt::Error;
+use antumbra_scene::material::{CoatedConductor, CoatedDiffuse, Matte, Mix, ThinDielectric};
 use antumbra_scene::{EnvironmentMapping, Geometry, Integrator, Light, Material, Rgb, Scene};
 
 use crate::{load_text, scene};
@@ -86,19 +87,19 @@ fn material4(world: &str) -> Material {
 fn coated_materials_are_read_with_their_defaults() {
     assert_eq!(
         material4(r#"Material "coateddiffuse" "float roughness" .25 "rgb reflectance" [.1 .2 .3]"#),
-        Material::CoatedDiffuse {
+        Material::CoatedDiffuse(CoatedDiffuse {
             reflectance: Rgb::new(0.1, 0.2, 0.3).into(),
             eta: 1.5.into(),
             roughness: 0.5.into(),
-        }
+        })
     );
-    let Material::CoatedConductor {
+    let Material::CoatedConductor(CoatedConductor {
         eta,
         roughness,
         coat_eta,
         coat_roughness,
         ..
-    } = material4(
+    }) = material4(
         r#"Material "coatedconductor" "float interface.roughness" .04 "float interface.eta" 1.7 "float conductor.uroughness" .09
            "spectrum conductor.eta" "metal-Au-eta" "spectrum conductor.k" "metal-Au-k""#,
     )
@@ -114,10 +115,10 @@ fn coated_materials_are_read_with_their_defaults() {
     assert!(eta.x < 0.4 && eta.z > 1.2, "gold is yellow: {eta}");
     assert_eq!(
         material4(r#"Material "thindielectric" "spectrum eta" "glass-BK7""#),
-        Material::ThinDielectric { eta: 1.5168.into() }
+        Material::ThinDielectric(ThinDielectric { eta: 1.5168.into() })
     );
     let text = r#"Material "thindielectric" "spectrum eta" [500 1.6 600 1.5]"#;
-    let Material::ThinDielectric { eta } = material4(text) else {
+    let Material::ThinDielectric(ThinDielectric { eta }) = material4(text) else {
         panic!()
     };
     assert!((eta.constant().unwrap() - 1.5124).abs() < 1e-4);
@@ -193,7 +194,7 @@ fn lights_have_the_luminance_of_their_scale() {
 #[test]
 fn surfaces_are_seen_under_daylight() {
     let kd = |text: &str| match material4(text) {
-        Material::Matte { kd, .. } => *kd.constant().expect("a colour"),
+        Material::Matte(Matte { kd, .. }) => *kd.constant().expect("a colour"),
         other => panic!("{other:?}"),
     };
     let grey = kd(r#"Material "diffuse" "spectrum reflectance" [300 .25 900 .25]"#);
@@ -233,7 +234,7 @@ fn names_are_those_of_the_whole_file() {
         NamedMaterial "early" Shape "sphere""#;
     let scene = scene4("", text);
     let kd = |index: usize| match &scene.materials[scene.shapes[index].material] {
-        Material::Matte { kd, .. } => kd.constant().expect("a colour").x,
+        Material::Matte(Matte { kd, .. }) => kd.constant().expect("a colour").x,
         other => panic!("{other:?}"),
     };
     assert_eq!([kd(0), kd(1), kd(2)], [0.2, 0.2, 0.1]);
@@ -260,11 +261,11 @@ fn mixtures_have_two_named_materials() {
                Material "mix" "string materials" [ "a" "b" ] {amount}"#
         )
     };
-    let Material::Mix { materials, amount } = material4(&text("\"float amount\" .25")) else {
+    let Material::Mix(Mix { materials, amount }) = material4(&text("\"float amount\" .25")) else {
         panic!()
     };
     // The scene's amount is the scale of its first material.
-    assert!(matches!(*materials[0], Material::Metal { .. }));
+    assert!(matches!(*materials[0], Material::Metal(_)));
     assert_eq!(amount, Rgb::splat(0.25).into());
     let found = format!("{:?}", material4(&text("\"texture amount\" \"mask\"")));
     assert!(found.contains("Checkerboard"), "{found}");

@@ -4,7 +4,7 @@ use antumbra::{Isa, Ray};
 use glam::Vec3;
 
 use super::{ShadowQueue, power_heuristic};
-use crate::columns::{BLOCK, Column, Column3, Flags, Stage, is_zero, run, select};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, columns, is_zero, run, select};
 use crate::light::LightSamples;
 use crate::material::bsdf::{Evaluation, lambert_towards};
 use crate::surface::{Frame, Room, SEGMENT_SHARE, offset, offset_distance};
@@ -32,53 +32,37 @@ pub trait Points {
 }
 
 /// Light that may arrive at a block of points, in columns.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Arrivals {
     scattered: Scattered,
     shadows: Shadows,
 }
 
-/// Scattering from the light towards the previous vertex.
-#[derive(Debug)]
-struct Scattered {
-    /// Direction of the light in the frame.
-    wi: Column3,
-    /// Whether the light comes from the side of the previous vertex.
-    reflects: Flags,
-    value: Column3,
-    /// Density with which the BSDF finds the direction.
-    pdf: Column,
+columns! {
+    /// Scattering from the light towards the previous vertex.
+    #[derive(Debug)]
+    struct Scattered {
+        /// Direction of the light in the frame.
+        wi: Column3,
+        /// Whether the light comes from the side of the previous vertex.
+        reflects: Flags,
+        value: Column3,
+        /// Density with which the BSDF finds the direction.
+        pdf: Column,
+    }
 }
 
-/// Shadow rays.
-#[derive(Debug)]
-struct Shadows {
-    org: Column3,
-    dir: Column3,
-    tfar: Column,
-    /// Light that they bring.
-    light: Column3,
-    /// Whether there is any.
-    asks: Flags,
-}
-
-impl Default for Arrivals {
-    fn default() -> Self {
-        Self {
-            scattered: Scattered {
-                wi: Column3::default(),
-                reflects: [0; BLOCK],
-                value: Column3::default(),
-                pdf: [0.0; BLOCK],
-            },
-            shadows: Shadows {
-                org: Column3::default(),
-                dir: Column3::default(),
-                tfar: [0.0; BLOCK],
-                light: Column3::default(),
-                asks: [0; BLOCK],
-            },
-        }
+columns! {
+    /// Shadow rays.
+    #[derive(Debug)]
+    struct Shadows {
+        org: Column3,
+        dir: Column3,
+        tfar: Column,
+        /// Light that they bring.
+        light: Column3,
+        /// Whether there is any.
+        asks: Flags,
     }
 }
 

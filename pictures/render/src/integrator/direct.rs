@@ -19,12 +19,11 @@ use glam::Vec3;
 
 use super::arrival::{Arrivals, Points};
 use super::hits::Hits;
-use super::path::{neighbours, receiver, shading_frame};
+use super::path::{receiver, shade};
 use super::tracer::Tracer;
 use super::{Batch, ENOUGH, ShadowQueue, dimension, power_heuristic};
 use crate::columns::BLOCK;
 use crate::light::{ElementSample, Light, LightBlock, LightSample, Receiver, before};
-use crate::material::Material;
 use crate::material::bsdf::Bsdf;
 use crate::sampler::{Stream, mix};
 use crate::surface::{Frame, Surface};
@@ -208,23 +207,17 @@ impl DirectLighting {
             batch.emitted[sample as usize] += throughput * escaped;
             return;
         };
-        let material = world.material(surface.shape);
-        if let Material::None = material {
+        let Some(hit) = self.hits.hit(index) else {
+            return;
+        };
+        let own = (&rays[index], sample, step.from_camera);
+        let Some((bsdf, frame)) = shade(world, batch, own, &surface, hit) else {
             let ray = surface.ray_along(rays[index].dir.into());
             self.through.push(ray, sample, throughput, place);
             return;
-        }
-        batch.emitted[sample as usize] += throughput * world.lights.emitted(&surface);
-        let made;
-        let (bsdf, frame) = match (material, self.hits.hit(index)) {
-            (Material::Constant(bsdf), _) => (bsdf, shading_frame(world, bsdf, &surface)),
-            (Material::Varying(varying), Some(hit)) => {
-                let neighbours = neighbours(world, batch, (&rays[index], sample), step.from_camera);
-                made = varying.shade(&world.shapes, &surface, hit, neighbours.as_ref());
-                (&made.0, made.1)
-            }
-            _ => return,
         };
+        let bsdf = &*bsdf;
+        batch.emitted[sample as usize] += throughput * world.lights.emitted(&surface);
         if bsdf.is_black() {
             return;
         }

@@ -1,6 +1,7 @@
 //! Queues stay short, however many rays one point sends. The time at which they are traced changes nothing.
 
 use antumbra::recipe::Engine;
+use antumbra_scene::material::Matte;
 use std::sync::Arc;
 
 use antumbra::Isa;
@@ -39,10 +40,10 @@ fn scene(integrator: Settings) -> Scene {
         shapes: vec![ball(5.0, None), ball(-5.0, Some(lamp))],
         objects: Vec::new(),
         instances: Vec::new(),
-        materials: vec![Material::Matte {
+        materials: vec![Material::Matte(Matte {
             kd: Vec3::splat(0.5).into(),
             sigma: 0.0.into(),
-        }],
+        })],
         media: Vec::new(),
         lights: vec![Light::Infinite {
             radiance: Vec3::new(0.1, 0.2, 0.3),
@@ -161,10 +162,10 @@ fn lit_floor() -> Scene {
     scene
         .shapes
         .push(like(&scene.shapes[1], square(-1.0, 2.0), 0));
-    scene.materials.push(Material::Matte {
+    scene.materials.push(Material::Matte(Matte {
         kd: Vec3::splat(0.7).into(),
         sigma: 20.0.into(),
-    });
+    }));
     scene.lights = vec![Light::Infinite {
         radiance: Vec3::new(0.1, 0.2, 0.3),
         environment: None,

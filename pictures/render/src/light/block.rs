@@ -9,7 +9,7 @@ use glam::Vec3;
 use super::emitter::{AreaDraw, solid_angle_pdf, stretch};
 use super::sky::{self, Sky};
 use super::{End, Light, LightSample, Lights, Receiver};
-use crate::columns::{BLOCK, Column, Column3, Flags, Stage, is_zero, run, select};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, columns, is_zero, run, select};
 use crate::sampler::warp::{cosine_hemisphere, triangle, uniform_hemisphere};
 use crate::surface::{Frame, interpolate};
 
@@ -24,34 +24,38 @@ pub struct LightBlock {
     drawn: Drawn,
 }
 
-/// Columns of [`Receiver`], and the random values for the samples.
-#[derive(Clone, Debug)]
-pub struct Asked {
-    /// Position in the world.
-    pub point: Column3,
-    /// Unit geometric normal on the side of the viewer.
-    pub normal: Column3,
-    /// Whether light from the other side counts, too.
-    pub both_sides: Flags,
-    /// Whether the lane wants a sample.
-    pub wants: Flags,
-    /// Choice of the light. The second column is not used.
-    pub choice: [Column; 2],
-    /// Place on the light.
-    pub u: [Column; 2],
+columns! {
+    /// Columns of [`Receiver`], and the random values for the samples.
+    #[derive(Clone, Debug)]
+    pub struct Asked {
+        /// Position in the world.
+        pub point: Column3,
+        /// Unit geometric normal on the side of the viewer.
+        pub normal: Column3,
+        /// Whether light from the other side counts, too.
+        pub both_sides: Flags,
+        /// Whether the lane wants a sample.
+        pub wants: Flags,
+        /// Choice of the light. The second column is not used.
+        pub choice: [Column; 2],
+        /// Place on the light.
+        pub u: [Column; 2],
+    }
 }
 
-/// Choice of one light per lane.
-#[derive(Clone, Debug)]
-pub struct Chosen {
-    /// Index of the light in [`Lights::all`].
-    pub light: Flags,
-    /// Element of the light, unless lights are sampled as wholes.
-    pub element: Flags,
-    /// Probability of the choice, or the number of samples.
-    pub probability: Column,
-    /// Whether there is a light at all.
-    pub any: bool,
+columns! {
+    /// Choice of one light per lane.
+    #[derive(Clone, Debug)]
+    pub struct Chosen {
+        /// Index of the light in [`Lights::all`].
+        pub light: Flags,
+        /// Element of the light, unless lights are sampled as wholes.
+        pub element: Flags,
+        /// Probability of the choice, or the number of samples.
+        pub probability: Column,
+        /// Whether there is a light at all.
+        pub any: bool,
+    }
 }
 
 /// Request for one of several samples of an element of a light.
@@ -67,110 +71,56 @@ pub struct ElementSample {
     pub u: [f32; 2],
 }
 
-/// Columns of [`LightSample`].
-#[derive(Clone, Debug)]
-pub struct LightSamples {
-    /// Unit direction to the light.
-    pub wi: Column3,
-    /// Radiance that arrives unless the light is occluded.
-    pub radiance: Column3,
-    /// Density of this sample of this light.
-    pub density: Column,
-    /// Whether no other technique can find the direction.
-    pub is_delta: Flags,
-    /// Whether the light is infinitely far away. Otherwise it lies at `target`.
-    pub is_far: Flags,
-    /// Position on the light.
-    pub target: Column3,
-    /// Error bound of `target`, and normal of its surface. 0 for a point.
-    pub error: Column3,
-    /// See `error`.
-    pub normal: Column3,
-    /// Whether there is a sample.
-    pub found: Flags,
+columns! {
+    /// Columns of [`LightSample`].
+    #[derive(Clone, Debug)]
+    pub struct LightSamples {
+        /// Unit direction to the light.
+        pub wi: Column3,
+        /// Radiance that arrives unless the light is occluded.
+        pub radiance: Column3,
+        /// Density of this sample of this light.
+        pub density: Column,
+        /// Whether no other technique can find the direction.
+        pub is_delta: Flags,
+        /// Whether the light is infinitely far away. Otherwise it lies at `target`.
+        pub is_far: Flags,
+        /// Position on the light.
+        pub target: Column3,
+        /// Error bound of `target`, and normal of its surface. 0 for a point.
+        pub error: Column3,
+        /// See `error`.
+        pub normal: Column3,
+        /// Whether there is a sample.
+        pub found: Flags,
+    }
 }
 
-/// Lights to be sampled in vectors.
-#[derive(Clone, Debug)]
-struct Drawn {
-    kind: Flags,
-    corners: [Column3; 3],
-    normal: Column3,
-    /// Radiance of the light.
-    radiance: Column3,
-    area: Column,
-    two_sided: Flags,
-    /// How far the random value reaches into its triangle, and the size of that.
-    into: [[f64; BLOCK]; 2],
-    u: [Column; 2],
-    /// Direction in the frame of a sky, unless it is cosine-weighted.
-    local: Column3,
-    is_cosine: Flags,
-    other_side: Flags,
+columns! {
+    /// Lights to be sampled in vectors.
+    #[derive(Clone, Debug)]
+    struct Drawn {
+        kind: Flags,
+        corners: [Column3; 3],
+        normal: Column3,
+        /// Radiance of the light.
+        radiance: Column3,
+        area: Column,
+        two_sided: Flags,
+        /// How far the random value reaches into its triangle, and the size of that.
+        into: [[f64; BLOCK]; 2],
+        u: [Column; 2],
+        /// Direction in the frame of a sky, unless it is cosine-weighted.
+        local: Column3,
+        is_cosine: Flags,
+        other_side: Flags,
+    }
 }
 
 /// Kinds of lanes.
 const NONE: u32 = 0;
 const AREA: u32 = 1;
 const SKY: u32 = 2;
-
-impl Default for Asked {
-    fn default() -> Self {
-        Self {
-            point: Column3::default(),
-            normal: Column3::default(),
-            both_sides: [0; BLOCK],
-            wants: [0; BLOCK],
-            choice: [[0.0; BLOCK]; 2],
-            u: [[0.0; BLOCK]; 2],
-        }
-    }
-}
-
-impl Default for Chosen {
-    fn default() -> Self {
-        Self {
-            light: [0; BLOCK],
-            element: [0; BLOCK],
-            probability: [0.0; BLOCK],
-            any: false,
-        }
-    }
-}
-
-impl Default for LightSamples {
-    fn default() -> Self {
-        Self {
-            wi: Column3::default(),
-            radiance: Column3::default(),
-            density: [0.0; BLOCK],
-            is_delta: [0; BLOCK],
-            is_far: [0; BLOCK],
-            target: Column3::default(),
-            error: Column3::default(),
-            normal: Column3::default(),
-            found: [0; BLOCK],
-        }
-    }
-}
-
-impl Default for Drawn {
-    fn default() -> Self {
-        Self {
-            kind: [NONE; BLOCK],
-            corners: Default::default(),
-            normal: Column3::default(),
-            radiance: Column3::default(),
-            area: [0.0; BLOCK],
-            two_sided: [0; BLOCK],
-            into: [[0.0; BLOCK]; 2],
-            u: [[0.0; BLOCK]; 2],
-            local: Column3::default(),
-            is_cosine: [0; BLOCK],
-            other_side: [0; BLOCK],
-        }
-    }
-}
 
 impl Asked {
     /// Puts one receiver into all lanes.

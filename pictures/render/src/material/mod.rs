@@ -1,26 +1,25 @@
 //! Materials: parameters, and how they scatter light at a point.
 //!
 //! - [`Material`]: a material ready for shading
-//! - `parameters.rs`: parameters of every kind of material, and the BSDF that they make
-//! - `disney.rs`: the same for the material `disney`
+//! - `kinds/`: parameters of every kind of material, and the BSDF that they make
 //! - `patch.rs`: surroundings of a point, for textures and bumps
 //! - `bsdf/`: how a point scatters light
 //!
 //! Materials whose parameters are constant have one [`Bsdf`]. Other materials make one at every point.
 
 pub mod bsdf;
-mod disney;
-mod parameters;
+mod kinds;
 mod patch;
 
 use antumbra::{Hit, Ray};
-use antumbra_scene::{Param, Rgb};
+use antumbra_scene::Rgb;
+use antumbra_scene::material::Map;
 use glam::Vec3;
 
 use crate::surface::{Frame, Shapes, Surface};
 use crate::texture::{Input, Place, Textures};
 use bsdf::Bsdf;
-use parameters::{Lowering, Parameters};
+use kinds::{Here, Lowered, Lowering};
 pub use patch::Patch;
 
 /// A material ready for shading.
@@ -29,7 +28,7 @@ pub enum Material {
     /// No surface: rays go on.
     None,
     /// One [`Bsdf`] for all points.
-    Constant(Bsdf),
+    Constant(Box<Bsdf>),
     /// A [`Bsdf`] for every point.
     Varying(Box<Varying>),
 }
@@ -37,7 +36,7 @@ pub enum Material {
 /// A material that varies over the surface.
 #[derive(Clone, Debug)]
 pub struct Varying {
-    parameters: Parameters,
+    parameters: antumbra_scene::Material<Lowered>,
     /// Height of bumps above the surface.
     height: Option<Input<f32>>,
     /// Normals as colours, and the factor of their parts along the surface.
@@ -54,33 +53,34 @@ impl Material {
             textures,
             varies: false,
         };
-        let parameters = lowering.parameters(material);
-        let height = bumps(material).map(|height| lowering.textures.input(height));
-        // A constant height moves the surface and tilts nothing.
-        let height = height.filter(|height| matches!(height, Input::Texture(_)));
-        let normals = match material {
-            antumbra_scene::Material::NormalMapped { normal, scale, .. } => {
-                Some((lowering.textures.input(normal), *scale))
+        let parameters = lowering.material(material);
+        let height = bumps(&parameters).cloned();
+        let normals = match &parameters {
+            antumbra_scene::Material::NormalMapped(mapped) => {
+                Some((mapped.normal.clone(), mapped.scale))
             }
             _ => None,
         };
-        if lowering.varies || height.is_some() || normals.is_some() {
+        if lowering.varies || normals.is_some() {
             Self::Varying(Box::new(Varying {
                 parameters,
                 height,
                 normals,
             }))
         } else {
-            Self::Constant(parameters.bsdf(&Place::default()))
+            Self::Constant(Box::new(kinds::bsdf(&parameters, &Place::default())))
         }
     }
 }
 
-/// Height of the bumps of a material. A mix has the bumps of its first material, as in pbrt-v3.
-fn bumps(material: &antumbra_scene::Material) -> Option<&Param<f32>> {
+/// Height of the bumps of a material. A mix has the bumps of its first material, as in pbrt-v3. A constant height moves the
+/// surface and tilts nothing.
+fn bumps(material: &antumbra_scene::Material<Lowered>) -> Option<&Input<f32>> {
     match material {
-        antumbra_scene::Material::Bumped { height, .. } => Some(height),
-        antumbra_scene::Material::Mix { materials, .. } => bumps(&materials[0]),
+        antumbra_scene::Material::Bumped(bumped) => {
+            Some(&bumped.height).filter(|height| matches!(height, Input::Texture(_)))
+        }
+        antumbra_scene::Material::Mix(mix) => bumps(&mix.materials[0]),
         _ => None,
     }
 }
@@ -95,7 +95,7 @@ impl Varying {
         neighbours: Option<&[Ray; 2]>,
     ) -> (Bsdf, Frame) {
         let patch = Patch::at(shapes, surface, hit, neighbours);
-        let bsdf = self.parameters.bsdf(&patch.place);
+        let bsdf = kinds::bsdf(&self.parameters, &patch.place);
         if let Some((normals, scale)) = &self.normals {
             let mapped = normals.at(&patch.place) * 2.0 - Vec3::ONE;
             let mapped = Vec3::new(mapped.x * scale, mapped.y * scale, mapped.z);

@@ -1,8 +1,13 @@
 //! Varying materials against constant ones, and bumps against the normals of the surface that they stand for.
 
+use antumbra_scene::material::{
+    Bumped, Glass, Matte, Metal, Mix, NormalMapped, Plastic, Substrate, Translucent, Uber,
+};
 use std::sync::Arc;
 
-use antumbra_scene::{Geometry, Mapping, Material as Scene, Rgb, Shape, Texture, TriangleMesh};
+use antumbra_scene::{
+    Geometry, Mapping, Material as Scene, Param, Rgb, Shape, Texture, TriangleMesh,
+};
 
 use super::*;
 use crate::sampler::warp::uniform_sphere;
@@ -50,7 +55,7 @@ fn shade(material: &Scene, shapes: &Shapes) -> (Bsdf, Frame) {
     let surface = Surface::found(shapes, &ray, &hit);
     match Material::new(material, &mut Textures::default()) {
         Material::Varying(varying) => varying.shade(shapes, &surface, &hit, None),
-        Material::Constant(bsdf) => (bsdf, Frame::around(surface.shading_normal)),
+        Material::Constant(bsdf) => (*bsdf, Frame::around(surface.shading_normal)),
         Material::None => panic!("it has a surface"),
     }
 }
@@ -80,33 +85,33 @@ fn parameters_from_textures_are_parameters() {
     };
     let materials = |t: bool| {
         let roughness = || [number(t, 0.3), number(t, 0.2)];
-        let metal = Scene::Metal {
+        let metal = Scene::Metal(Metal {
             eta: color(t, 0.9),
             k: color(t, 2.0),
             roughness: roughness(),
             remap_roughness: true,
-        };
-        let matte = Scene::Matte {
+        });
+        let matte = Scene::Matte(Matte {
             kd: color(t, 0.5),
             sigma: number(t, 10.0),
-        };
+        });
         vec![
             matte.clone(),
             metal.clone(),
-            Scene::Plastic {
+            Scene::Plastic(Plastic {
                 kd: color(t, 0.4),
                 ks: color(t, 0.3),
                 roughness: number(t, 0.1),
                 remap_roughness: true,
-            },
-            Scene::Glass {
+            }),
+            Scene::Glass(Glass {
                 kr: color(t, 0.9),
                 kt: color(t, 0.8),
                 eta: number(t, 1.4),
                 roughness: roughness(),
                 remap_roughness: false,
-            },
-            Scene::Uber {
+            }),
+            Scene::Uber(Uber {
                 kd: color(t, 0.1),
                 ks: color(t, 0.2),
                 kr: color(t, 0.3),
@@ -115,25 +120,25 @@ fn parameters_from_textures_are_parameters() {
                 opacity: color(t, 0.8),
                 eta: number(t, 1.2),
                 remap_roughness: true,
-            },
-            Scene::Substrate {
+            }),
+            Scene::Substrate(Substrate {
                 kd: color(t, 0.5),
                 ks: color(t, 0.25),
                 roughness: roughness(),
                 remap_roughness: true,
-            },
-            Scene::Translucent {
+            }),
+            Scene::Translucent(Translucent {
                 kd: color(t, 0.5),
                 ks: color(t, 0.25),
                 reflect: color(t, 0.4),
                 transmit: color(t, 0.6),
                 roughness: number(t, 0.3),
                 remap_roughness: true,
-            },
-            Scene::Mix {
+            }),
+            Scene::Mix(Mix {
                 materials: [Arc::new(matte), Arc::new(metal)],
                 amount: color(t, 0.3),
-            },
+            }),
         ]
     };
     let sampler = Sampler::new(Method::Independent, 5);
@@ -166,17 +171,19 @@ fn bumps_tilt_the_frame() {
     let corners = [0.0, b, a, a + b];
     let mapping = Mapping::default();
     let height = Param::Texture(Arc::new(Texture::Bilerp { corners, mapping }));
-    let matte = Arc::new(Scene::Matte {
+    let matte = Arc::new(Scene::Matte(Matte {
         kd: rgb(0.5).into(),
         sigma: 0.0.into(),
-    });
-    let bumped = Scene::Bumped {
+    }));
+    let bumped = Scene::Bumped(Bumped {
         material: Arc::clone(&matte),
         height: height.clone(),
-    };
-    let mixed = |first: &Scene, second: &Scene| Scene::Mix {
-        materials: [first.clone(), second.clone()].map(Arc::new),
-        amount: Rgb::splat(0.5).into(),
+    });
+    let mixed = |first: &Scene, second: &Scene| {
+        Scene::Mix(Mix {
+            materials: [first.clone(), second.clone()].map(Arc::new),
+            amount: Rgb::splat(0.5).into(),
+        })
     };
     let expected = Vec3::new(-a, -b, 1.0).normalize();
     for (material, normals, expected) in [
@@ -205,18 +212,20 @@ fn bumps_tilt_the_frame() {
 fn what_does_not_vary_is_lowered_once() {
     let mut textures = Textures::default();
     let mut new = |material: &Scene| Material::new(material, &mut textures);
-    let matte = |kd| Scene::Matte {
-        kd,
-        sigma: 0.0.into(),
+    let matte = |kd| {
+        Scene::Matte(Matte {
+            kd,
+            sigma: 0.0.into(),
+        })
     };
     assert!(matches!(new(&Scene::None), Material::None));
     let plain = matte(rgb(0.5).into());
-    assert!(matches!(new(&plain), Material::Constant(Bsdf::Diffuse(_))));
-    let flat = Scene::Bumped {
+    assert!(matches!(new(&plain), Material::Constant(_)));
+    let flat = Scene::Bumped(Bumped {
         material: Arc::new(plain),
         height: 0.5.into(),
-    };
-    assert!(matches!(new(&flat), Material::Constant(Bsdf::Diffuse(_))));
+    });
+    assert!(matches!(new(&flat), Material::Constant(_)));
     assert!(matches!(
         new(&matte(hidden(rgb(0.5)))),
         Material::Varying(_)
@@ -234,14 +243,14 @@ fn normal_maps_tilt_the_normal() {
             ([0.5, 0.2, 0.9], 1.0, [0.0, -0.6, 0.8]),
             ([0.8, 0.5, 0.9], 0.5, [0.3, 0.0, 0.8]),
         ] {
-            let mapped = Scene::NormalMapped {
-                material: Arc::new(Scene::Matte {
+            let mapped = Scene::NormalMapped(NormalMapped {
+                material: Arc::new(Scene::Matte(Matte {
                     kd: rgb(0.5).into(),
                     sigma: 0.0.into(),
-                }),
+                })),
                 normal: hidden(Rgb::from(color)),
                 scale,
-            };
+            });
             let (_, frame) = shade(&mapped, &shapes);
             let found = frame.to_world(Vec3::Z);
             let expected = Vec3::from(expected).normalize();

@@ -121,19 +121,15 @@ fn mean(world: &World, batch: &Batch, hits: &[Option<antumbra::Hit>], step: f32)
         let moved = batch.camera(world, sample);
         let camera = moved.as_ref().unwrap_or(&world.camera);
         let neighbours = camera.neighbours(ray, step);
-        let constant;
         let (bsdf, frame) = match world.material(surface.shape) {
-            Material::None => {
-                constant = Bsdf::Black;
-                (constant, Frame::around(surface.shading_normal))
-            }
+            Material::None => (Bsdf::black(), Frame::around(surface.shading_normal)),
             Material::Constant(bsdf) => {
                 let frame = if bsdf.is_anisotropic() {
                     Frame::along(surface.shading_normal, surface.tangent(&world.shapes))
                 } else {
                     Frame::around(surface.shading_normal)
                 };
-                (bsdf.clone(), frame)
+                (Bsdf::clone(bsdf), frame)
             }
             Material::Varying(varying) => {
                 varying.shade(&world.shapes, &surface, hit, Some(&neighbours))

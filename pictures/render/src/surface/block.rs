@@ -14,7 +14,7 @@ use super::origin_offset::{self, EDGE_ERRORS, Room, offset, offset_distance};
 use super::point::{on_sphere, start_inside};
 use super::shapes::Shapes;
 use super::triangle::{Plane, edge_distance, interpolate, oriented, sides};
-use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, columns, run};
 
 /// Surfaces of a block of hits.
 #[derive(Clone, Debug)]
@@ -23,6 +23,16 @@ pub struct SurfaceBlock {
     surfaces: Surfaces,
     /// Shape of each lane.
     pub hit: [ShapeHit; BLOCK],
+}
+
+impl Default for SurfaceBlock {
+    fn default() -> Self {
+        Self {
+            found: Found::default(),
+            surfaces: Surfaces::default(),
+            hit: [ShapeHit::default(); BLOCK],
+        }
+    }
 }
 
 /// Part of the scene that was hit.
@@ -50,51 +60,30 @@ struct Found {
     origin_offset: f32,
 }
 
-/// Columns of [`Surface`].
-#[derive(Clone, Debug)]
-pub struct Surfaces {
-    /// Position in the world.
-    pub point: Column3,
-    /// Point of the surface above which rays begin.
-    pub start: Column3,
-    /// Distance from `start` at which rays begin.
-    pub distance: Column,
-    /// Beginning of rays on the side from which the ray came.
-    pub origin: Column3,
-    /// Unit geometric normal.
-    pub normal: Column3,
-    /// Unit shading normal.
-    pub shading_normal: Column3,
-    /// Unit direction towards where the ray came from.
-    pub wo: Column3,
-    error: Column3,
-    /// Distance to the nearest edge in the space of the object, and the scale from there to the world.
-    edge: Column,
-    scale: Column,
-    /// Whether the point is too close to an edge.
-    narrow: Flags,
-}
-
-impl Default for SurfaceBlock {
-    fn default() -> Self {
-        let zeros = [0.0; BLOCK];
-        Self {
-            found: Found::default(),
-            surfaces: Surfaces {
-                point: Column3::default(),
-                start: Column3::default(),
-                distance: zeros,
-                origin: Column3::default(),
-                normal: Column3::default(),
-                shading_normal: Column3::default(),
-                wo: Column3::default(),
-                error: Column3::default(),
-                edge: zeros,
-                scale: zeros,
-                narrow: [0; BLOCK],
-            },
-            hit: [ShapeHit::default(); BLOCK],
-        }
+columns! {
+    /// Columns of [`Surface`].
+    #[derive(Clone, Debug)]
+    pub struct Surfaces {
+        /// Position in the world.
+        pub point: Column3,
+        /// Point of the surface above which rays begin.
+        pub start: Column3,
+        /// Distance from `start` at which rays begin.
+        pub distance: Column,
+        /// Beginning of rays on the side from which the ray came.
+        pub origin: Column3,
+        /// Unit geometric normal.
+        pub normal: Column3,
+        /// Unit shading normal.
+        pub shading_normal: Column3,
+        /// Unit direction towards where the ray came from.
+        pub wo: Column3,
+        error: Column3,
+        /// Distance to the nearest edge in the space of the object, and the scale from there to the world.
+        edge: Column,
+        scale: Column,
+        /// Whether the point is too close to an edge.
+        narrow: Flags,
     }
 }
 

@@ -132,6 +132,7 @@ const MAX_SIDE: u32 = 1 << 24;
 mod tests {
     use std::sync::Arc;
 
+    use antumbra_scene::material::{Matte, Mix};
     use antumbra_scene::{ImageTexture, Mapping, TextureFilter, Wrap};
     use glam::Vec3;
 
@@ -139,7 +140,7 @@ mod tests {
 
     fn matte(kd: Param<Vec3>) -> Material {
         let sigma = 0.0.into();
-        Material::Matte { kd, sigma }
+        Material::Matte(Matte { kd, sigma })
     }
 
     fn check_material(material: &Material) -> Result<(), Error> {
@@ -150,9 +151,11 @@ mod tests {
     fn what_doubles_with_every_line_is_refused() {
         let mut material = Arc::new(matte(Vec3::ONE.into()));
         let mut texture = Param::Constant(Vec3::ONE);
-        let double = |material: &Arc<Material>| Material::Mix {
-            materials: [Arc::clone(material), Arc::clone(material)],
-            amount: Vec3::ONE.into(),
+        let double = |material: &Arc<Material>| {
+            Material::Mix(Mix {
+                materials: [Arc::clone(material), Arc::clone(material)],
+                amount: Vec3::ONE.into(),
+            })
         };
         for line in 0..60 {
             let of_texture = matte(texture.clone());

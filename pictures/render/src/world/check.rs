@@ -1,5 +1,6 @@
 //! Refuses scenes that would panic or make no picture.
 
+use antumbra_scene::material::{Bumped, Mix, NormalMapped, Subsurface};
 use antumbra_scene::{DensityGrid, Film, Geometry, Integrator, Material, Medium, Rgb, Scene};
 
 use crate::Error;
@@ -58,12 +59,11 @@ pub fn check(scene: &Scene) -> Result<(), Error> {
 /// Whether light goes on inside of shapes of this material.
 pub fn is_body(material: &Material) -> bool {
     match material {
-        Material::Subsurface { .. } => true,
+        Material::Subsurface(_) => true,
         Material::Disney(disney) => disney.scatters_inside(),
-        Material::Bumped { material, .. } | Material::NormalMapped { material, .. } => {
-            is_body(material)
-        }
-        Material::Mix { materials, .. } => materials.iter().any(|part| is_body(part)),
+        Material::Bumped(Bumped { material, .. })
+        | Material::NormalMapped(NormalMapped { material, .. }) => is_body(material),
+        Material::Mix(Mix { materials, .. }) => materials.iter().any(|part| is_body(part)),
         _ => false,
     }
 }
@@ -77,12 +77,13 @@ fn check_bodies(scene: &Scene) -> Result<(), Error> {
         .filter(|(_, m)| is_body(m))
     {
         let inner = match material {
-            Material::Bumped { material, .. } | Material::NormalMapped { material, .. } => material,
+            Material::Bumped(Bumped { material, .. })
+            | Material::NormalMapped(NormalMapped { material, .. }) => material,
             material => material,
         };
         let reason = match (inner, scene.integrator) {
             (_, Integrator::DirectLighting { .. }) => "directlighting does not follow light inside",
-            (Material::Subsurface { eta, asymmetry, .. }, _) => {
+            (Material::Subsurface(Subsurface { eta, asymmetry, .. }), _) => {
                 let good = *eta > 0.0 && eta.is_finite() && asymmetry.abs() < 1.0;
                 if good {
                     continue;

@@ -6,6 +6,7 @@
 //! - mirrors and glass in a uniform world
 //! - which side emits, what is behind the camera, lens and filters in a uniform world
 
+use antumbra_scene::material::{Glass, Mirror, Plastic};
 use std::f64::consts::{FRAC_1_PI, FRAC_1_SQRT_2, PI};
 
 use crate::support::*;
@@ -229,9 +230,9 @@ fn mirrors_and_glass_vanish_in_a_uniform_world() {
         sphere(Vec3::new(0.1, 0.2, 4.0), 1.0),
         cube(Vec3::new(0.1, 0.2, 4.0), 0.9),
     ];
-    let mirror = Material::Mirror {
+    let mirror = Material::Mirror(Mirror {
         kr: Rgb::ONE.into(),
-    };
+    });
     for geometry in bodies {
         for material in [mirror.clone(), glass(1.5), glass(1.0)] {
             for integrator in [path(60), direct(DirectStrategy::All, 12)] {
@@ -263,9 +264,9 @@ fn a_mirror_shows_the_light_behind_the_camera() {
     add(
         &mut scene,
         floor(2.0),
-        Material::Mirror {
+        Material::Mirror(Mirror {
             kr: Rgb::splat(0.8).into(),
-        },
+        }),
     );
     let light = quad(Vec3::new(-5.0, -5.0, -3.0), Vec3::X * 10.0, Vec3::Y * 10.0);
     add(&mut scene, light, matte(0.0)).area_light = emission(3.0);
@@ -350,19 +351,19 @@ fn a_uniform_world_is_uniform_through_every_lens_and_filter() {
 fn integrators_agree_on_direct_light() {
     let mut scene = empty();
     scene.camera = look(Vec3::new(0.0, -4.0, 1.0), Vec3::new(0.0, 0.0, 2.5), 60.0);
-    let plastic = Material::Plastic {
+    let plastic = Material::Plastic(Plastic {
         kd: Rgb::splat(0.4).into(),
         ks: Rgb::splat(0.4).into(),
         roughness: 0.2.into(),
         remap_roughness: true,
-    };
-    let rough = Material::Glass {
+    });
+    let rough = Material::Glass(Glass {
         kr: Rgb::ONE.into(),
         kt: Rgb::ONE.into(),
         eta: 1.4.into(),
         roughness: [0.3, 0.5].map(Param::Constant),
         remap_roughness: false,
-    };
+    });
     add(&mut scene, floor(3.0), plastic);
     add(&mut scene, cube(Vec3::new(0.8, 0.0, 2.6), 0.4), matte(0.7));
     add(&mut scene, sphere(Vec3::new(-0.8, 0.0, 2.5), 0.5), rough);

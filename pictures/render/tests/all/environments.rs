@@ -5,6 +5,7 @@
 //! - with light samples, without, and with both
 //! - strategies of choice between lights
 
+use antumbra_scene::material::{Glass, Plastic};
 use std::sync::Arc;
 
 use crate::support::*;
@@ -158,19 +159,19 @@ fn the_camera_sees_the_image() {
 fn things() -> Scene {
     let mut scene = empty();
     scene.camera = look(Vec3::new(0.0, -4.0, 1.0), Vec3::new(0.0, 0.0, 2.5), 60.0);
-    let plastic = Material::Plastic {
+    let plastic = Material::Plastic(Plastic {
         kd: Rgb::splat(0.4).into(),
         ks: Rgb::splat(0.4).into(),
         roughness: 0.3.into(),
         remap_roughness: false,
-    };
-    let rough = Material::Glass {
+    });
+    let rough = Material::Glass(Glass {
         kr: Rgb::ONE.into(),
         kt: Rgb::ONE.into(),
         eta: 1.4.into(),
         roughness: [0.3.into(), 0.5.into()],
         remap_roughness: false,
-    };
+    });
     add(&mut scene, floor(3.0), plastic);
     add(&mut scene, cube(Vec3::new(0.8, 0.0, 2.6), 0.4), matte(0.7));
     add(&mut scene, sphere(Vec3::new(-0.8, 0.0, 2.5), 0.5), rough);

@@ -1,5 +1,6 @@
 //! Hair on curves.
 
+use antumbra_scene::material::Hair;
 use std::sync::Arc;
 
 use crate::support::*;
@@ -11,12 +12,12 @@ use antumbra_scene::{
 use glam::Vec3;
 
 fn hair(absorption: f32) -> Material {
-    Material::Hair {
+    Material::Hair(Hair {
         pigment: Pigment::Absorption(Rgb::splat(absorption).into()),
         eta: 1.55.into(),
         roughness: [0.4.into(), 0.5.into()],
         tilt: 0.0.into(),
-    }
+    })
 }
 
 /// A straight hair along x through (0, y, z).

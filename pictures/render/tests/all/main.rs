@@ -21,6 +21,7 @@ mod closed_form;
 mod environments;
 mod figures;
 mod hair;
+mod kinds;
 mod live;
 mod materials;
 mod media;

@@ -1,5 +1,6 @@
 //! Textured, layered and absent surfaces in whole pictures, against closed forms and each other.
 
+use antumbra_scene::material::{Bumped, Matte, Metal, Mirror, Mix, Substrate, Translucent, Uber};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
@@ -31,7 +32,7 @@ fn grey(value: f32) -> Param<Rgb> {
 }
 
 fn uber([kd, ks, kr, kt]: [f32; 4], opacity: f32) -> Material {
-    Material::Uber {
+    Material::Uber(Uber {
         kd: grey(kd),
         ks: grey(ks),
         kr: grey(kr),
@@ -40,14 +41,14 @@ fn uber([kd, ks, kr, kt]: [f32; 4], opacity: f32) -> Material {
         opacity: grey(opacity),
         eta: 1.5.into(),
         remap_roughness: false,
-    }
+    })
 }
 
 fn mix(first: Material, second: Material, amount: f32) -> Material {
-    Material::Mix {
+    Material::Mix(Mix {
         materials: [Arc::new(first), Arc::new(second)],
         amount: grey(amount),
-    }
+    })
 }
 
 /// A square of the plane z = `height`, seen from above, with texture coordinates 0 to 1.
@@ -93,15 +94,15 @@ const EWA: TextureFilter = TextureFilter::Ewa {
 /// straight through, mirrored, refracted or scattered is 1.
 #[test]
 fn bodies_that_lose_nothing_vanish_in_a_uniform_world() {
-    let mirror = || Material::Mirror { kr: grey(1.0) };
-    let sheet = Material::Translucent {
+    let mirror = || Material::Mirror(Mirror { kr: grey(1.0) });
+    let sheet = Material::Translucent(Translucent {
         kd: grey(1.0),
         ks: grey(0.0),
         reflect: grey(0.25),
         transmit: grey(0.75),
         roughness: 0.1.into(),
         remap_roughness: true,
-    };
+    });
     for (material, depth) in [
         (Material::None, 1),
         (uber([0.0; 4], 0.0), 6),
@@ -155,7 +156,7 @@ fn panes_let_their_share_through() {
         scene.shapes[1].material = scene.materials.len();
         scene.materials.push(mix(
             uber([0.0; 4], 0.0),
-            Material::Mirror { kr: grey(1.0) },
+            Material::Mirror(Mirror { kr: grey(1.0) }),
             0.25,
         ));
         let found = mean(&picture(&scene, 256));
@@ -168,26 +169,26 @@ fn panes_let_their_share_through() {
 fn integrators_agree_on_layered_materials() {
     let rough = || [0.3.into(), 0.1.into()];
     let materials = [
-        Material::Metal {
+        Material::Metal(Metal {
             eta: Rgb::new(0.2, 0.9, 1.1).into(),
             k: Rgb::new(3.9, 2.5, 2.1).into(),
             roughness: rough(),
             remap_roughness: true,
-        },
-        Material::Substrate {
+        }),
+        Material::Substrate(Substrate {
             kd: grey(0.5),
             ks: grey(0.3),
             roughness: rough(),
             remap_roughness: true,
-        },
-        Material::Translucent {
+        }),
+        Material::Translucent(Translucent {
             kd: grey(0.5),
             ks: grey(0.5),
             reflect: grey(0.5),
             transmit: grey(0.5),
             roughness: 0.3.into(),
             remap_roughness: false,
-        },
+        }),
         uber([0.3, 0.3, 0.0, 0.0], 1.0),
     ];
     for material in materials {
@@ -307,10 +308,10 @@ fn camera_rays_filter_textures() {
         let mut scene = empty();
         scene.lights.push(sky(1.0));
         scene.camera.fov = 30.0;
-        let matte = Material::Matte {
+        let matte = Material::Matte(Matte {
             kd: Param::Texture(Arc::new(texture)),
             sigma: 0.0.into(),
-        };
+        });
         // Each of 16 x 16 pixels sees a 16th of the texture or more, but one sample would see a texel.
         add(&mut scene, square(2.0, 0.6), matte);
         for integrator in [path(1), direct(1)] {
@@ -351,10 +352,10 @@ fn everything() -> Scene {
     let colors = (0..35).map(|i| [i as u8 * 7, 255 - i as u8, 128]).collect();
     let image = Arc::new(picture_of(Pixels::Rgb8(colors), 7, EWA));
     let kd = || Param::Texture(Arc::clone(&image));
-    let textured = Material::Matte {
+    let textured = Material::Matte(Matte {
         kd: kd(),
         sigma: 10.0.into(),
-    };
+    });
     let height = Param::Texture(Arc::new(Texture::Checkerboard {
         squares: [0.0.into(), 0.01.into()],
         mapping: Mapping::Spherical {
@@ -362,16 +363,16 @@ fn everything() -> Scene {
         },
         smooth: true,
     }));
-    let bumped = Material::Bumped {
+    let bumped = Material::Bumped(Bumped {
         material: Arc::new(uber([0.3, 0.2, 0.2, 0.2], 0.6)),
         height,
-    };
-    let blend = Material::Substrate {
+    });
+    let blend = Material::Substrate(Substrate {
         kd: kd(),
         ks: kd(),
         roughness: [0.1.into(), 0.3.into()],
         remap_roughness: true,
-    };
+    });
     add(&mut scene, square(3.0, 4.0), textured.clone());
     add(
         &mut scene,

@@ -5,6 +5,7 @@
 //! - furnaces at every scale
 //! - samples that are not finite are counted and leave their pixel alone
 
+use antumbra_scene::material::Mirror;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -41,9 +42,9 @@ fn gallery() -> Scene {
         sphere(Vec3::new(1.5, 0.5, 0.0), 0.75),
         glass(1.5),
     );
-    let mirror = Material::Mirror {
+    let mirror = Material::Mirror(Mirror {
         kr: Vec3::splat(0.9).into(),
-    };
+    });
     add(&mut scene, cube(Vec3::new(0.25, 2.0, 0.0), 0.75), mirror);
     let lamp = quad(Vec3::new(-1.0, -1.0, 4.0), Vec3::Y * 2.0, Vec3::X * 2.0);
     add(&mut scene, lamp, matte(0.0)).area_light = emission(8.0);

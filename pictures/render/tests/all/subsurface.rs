@@ -1,13 +1,14 @@
 //! Bodies in which light is scattered, against closed forms.
 
 use crate::support::*;
+use antumbra_scene::material::Subsurface;
 use antumbra_scene::{
     DirectStrategy, Integrator, Interior, Light, LightStrategy, Material, Rgb, Scene,
 };
 use glam::Vec3;
 
 fn body(interior: Interior, roughness: f32) -> Material {
-    Material::Subsurface {
+    Material::Subsurface(Subsurface {
         kr: Rgb::ONE.into(),
         kt: Rgb::ONE.into(),
         eta: 1.33,
@@ -15,7 +16,7 @@ fn body(interior: Interior, roughness: f32) -> Material {
         remap_roughness: false,
         interior,
         asymmetry: 0.2,
-    }
+    })
 }
 
 fn coefficients(absorption: f32, scattering: f32) -> Interior {

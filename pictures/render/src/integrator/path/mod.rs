@@ -26,6 +26,8 @@
 mod scatter;
 mod vertices;
 
+use std::borrow::Cow;
+
 use antumbra::{Hit, Ray};
 use glam::Vec3;
 
@@ -35,6 +37,7 @@ use super::tracer::Tracer;
 use super::{Batch, ShadowQueue, dimension, power_heuristic};
 use crate::columns::BLOCK;
 use crate::light::{LightBlock, Receiver, before};
+use crate::material::Material;
 use crate::material::bsdf::{Bsdf, Evaluation};
 use crate::surface::{Frame, Surface};
 use crate::world::World;
@@ -79,15 +82,15 @@ struct Block {
 }
 
 /// Paths under way.
-#[derive(Debug, Default)]
-struct Paths {
-    rays: Vec<Ray>,
-    states: Vec<State>,
+#[derive(Debug)]
+pub(super) struct Paths<T = State> {
+    pub rays: Vec<Ray>,
+    pub states: Vec<T>,
 }
 
 /// A path beside its ray.
 #[derive(Clone, Copy, Debug)]
-struct State {
+pub(super) struct State {
     sample: u32,
     throughput: Vec3,
     /// Product of squared ratios of refraction so far. Radiance is compressed inside glass and expands again outside,
@@ -107,14 +110,23 @@ pub(super) enum Origin {
     Hidden,
 }
 
-impl Paths {
-    fn clear(&mut self) {
+impl<T> Default for Paths<T> {
+    fn default() -> Self {
+        Self {
+            rays: Vec::new(),
+            states: Vec::new(),
+        }
+    }
+}
+
+impl<T> Paths<T> {
+    pub fn clear(&mut self) {
         self.rays.clear();
         self.states.clear();
     }
 
     #[inline(always)]
-    fn push(&mut self, ray: Ray, state: State) {
+    pub fn push(&mut self, ray: Ray, state: T) {
         self.rays.push(ray);
         self.states.push(state);
     }
@@ -290,17 +302,29 @@ pub(super) fn first_dimension(depth: u32) -> u32 {
     dimension::FIRST.wrapping_add(depth.wrapping_mul(PER_VERTEX))
 }
 
-/// Rays of the neighbouring samples, for a ray straight from the camera. See [`crate::material::Patch::at`].
-pub(super) fn neighbours(
-    world: &World,
+/// BSDF of the surface that a ray of a sample hits, and its frame. `None` without a material.
+pub(super) fn shade<'a>(
+    world: &'a World,
     batch: &Batch,
-    (ray, sample): (&Ray, u32),
-    from_camera: bool,
-) -> Option<[Ray; 2]> {
-    (from_camera && batch.step > 0.0).then(|| {
-        let moved = batch.camera(world, sample);
-        (moved.as_ref().unwrap_or(&world.camera)).neighbours(ray, batch.step)
-    })
+    (ray, sample, from_camera): (&Ray, u32, bool),
+    surface: &Surface,
+    hit: &Hit,
+) -> Option<(Cow<'a, Bsdf>, Frame)> {
+    match world.material(surface.shape) {
+        Material::None => None,
+        Material::Constant(bsdf) => {
+            Some((Cow::Borrowed(bsdf), shading_frame(world, bsdf, surface)))
+        }
+        Material::Varying(varying) => {
+            // Rays of the neighbouring samples, see `Patch::at`.
+            let neighbours = (from_camera && batch.step > 0.0).then(|| {
+                let moved = batch.camera(world, sample);
+                (moved.as_ref().unwrap_or(&world.camera)).neighbours(ray, batch.step)
+            });
+            let (bsdf, frame) = varying.shade(&world.shapes, surface, hit, neighbours.as_ref());
+            Some((Cow::Owned(bsdf), frame))
+        }
+    }
 }
 
 /// Frame in which a constant material is evaluated.
@@ -311,6 +335,49 @@ pub(super) fn shading_frame(world: &World, bsdf: &Bsdf, surface: &Surface) -> Fr
     } else {
         Frame::around(surface.shading_normal)
     }
+}
+
+/// A direction drawn from a BSDF.
+pub(super) struct Direction {
+    /// Direction in the frame of the BSDF.
+    pub wi: Vec3,
+    pub weight: Vec3,
+    /// `None` for a delta lobe.
+    pub pdf: Option<f32>,
+    /// Index of refraction inside over outside, if the path passes to the other side. Otherwise 1.
+    pub eta: f32,
+}
+
+/// Draws a direction from a BSDF. `None` where the path ends.
+pub(super) fn draw(
+    bsdf: &Bsdf,
+    wo: Vec3,
+    mut lobe: f32,
+    u: [f32; 2],
+    is_on_same_side: impl Fn(Vec3) -> bool,
+) -> Option<Direction> {
+    let delta_share = bsdf.delta_share();
+    if lobe < delta_share {
+        let sample = bsdf.sample_delta(wo, lobe / delta_share)?;
+        return Some(Direction {
+            wi: sample.wi,
+            weight: sample.weight / delta_share,
+            pdf: None,
+            eta: sample.eta,
+        });
+    }
+    if delta_share > 0.0 {
+        lobe = (lobe - delta_share) / (1.0 - delta_share);
+    }
+    let wi = bsdf.sample(wo, lobe, u)?;
+    let found = bsdf.evaluate(wo, wi, is_on_same_side(wi));
+    let pdf = found.pdf * (1.0 - delta_share);
+    (pdf != 0.0).then(|| Direction {
+        wi,
+        weight: found.value * (wi.z.abs() / pdf),
+        pdf: Some(pdf),
+        eta: if wo.z * wi.z < 0.0 { bsdf.eta() } else { 1.0 },
+    })
 }
 
 /// Surface as lights see it.

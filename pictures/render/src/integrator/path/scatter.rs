@@ -1,73 +1,53 @@
 //! Rays that continue the paths.
 
 use antumbra::{Isa, Ray};
-use glam::Vec3;
 
 use super::vertices::Vertices;
-use super::{DIRECTION, LOBE, Origin, Paths, State, World};
-use crate::columns::{BLOCK, Column, Column3, Flags, Stage, is_zero, run, select};
+use super::{DIRECTION, LOBE, Origin, Paths, State, World, draw};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, columns, is_zero, run, select};
 use crate::light::Asked;
-use crate::material::bsdf::{Bsdf, cosine_side, lambert_towards};
+use crate::material::bsdf::{cosine_side, lambert_towards};
 use crate::surface::{SurfaceBlock, Surfaces};
 
-/// Continuations of a block of paths, in columns.
-#[derive(Debug)]
-pub struct Continuations {
-    drawn: Drawn,
-    followed: Followed,
-    /// Random values: direction, lobe, roulette.
-    u: [Column; 2],
-    lobe: [Column; 2],
-    roulette: [Column; 2],
+columns! {
+    /// Continuations of a block of paths, in columns.
+    #[derive(Debug)]
+    pub struct Continuations {
+        drawn: Drawn,
+        followed: Followed,
+        /// Random values: direction, lobe, roulette.
+        u: [Column; 2],
+        lobe: [Column; 2],
+        roulette: [Column; 2],
+    }
 }
 
-/// Directions drawn from the BSDFs.
-#[derive(Debug)]
-struct Drawn {
-    /// Direction in the frame.
-    wi: Column3,
-    /// BSDF and cosine over density.
-    weight: Column3,
-    /// Density of the direction. No number for a delta lobe, which no light sample could have found.
-    pdf: Column,
-    /// Index of refraction inside over outside, if the path passes to the other side. Otherwise 1.
-    eta: Column,
-    /// Whether the path goes on.
-    goes_on: Flags,
+columns! {
+    /// Directions drawn from the BSDFs.
+    #[derive(Debug)]
+    struct Drawn {
+        /// Direction in the frame.
+        wi: Column3,
+        /// BSDF and cosine over density.
+        weight: Column3,
+        /// Density of the direction. No number for a delta lobe, which no light sample could have found.
+        pdf: Column,
+        /// Index of refraction inside over outside, if the path passes to the other side. Otherwise 1.
+        eta: Column,
+        /// Whether the path goes on.
+        goes_on: Flags,
+    }
 }
 
-/// Rays of the paths that go on.
-#[derive(Debug)]
-struct Followed {
-    org: Column3,
-    dir: Column3,
-    throughput: Column3,
-    expansion: Column,
-    goes_on: Flags,
-}
-
-impl Default for Continuations {
-    fn default() -> Self {
-        let zeros = [0.0; BLOCK];
-        Self {
-            drawn: Drawn {
-                wi: Column3::default(),
-                weight: Column3::default(),
-                pdf: zeros,
-                eta: zeros,
-                goes_on: [0; BLOCK],
-            },
-            followed: Followed {
-                org: Column3::default(),
-                dir: Column3::default(),
-                throughput: Column3::default(),
-                expansion: zeros,
-                goes_on: [0; BLOCK],
-            },
-            u: [zeros; 2],
-            lobe: [zeros; 2],
-            roulette: [zeros; 2],
-        }
+columns! {
+    /// Rays of the paths that go on.
+    #[derive(Debug)]
+    struct Followed {
+        org: Column3,
+        dir: Column3,
+        throughput: Column3,
+        expansion: Column,
+        goes_on: Flags,
     }
 }
 
@@ -98,7 +78,10 @@ impl Continuations {
             let bsdf = vertices.bsdf(world, other);
             let u = [self.u[0][lane], self.u[1][lane]];
             let columns = surfaces.columns();
-            let found = draw(bsdf, vertices, columns, lane, self.lobe[0][lane], u);
+            let (frame, wo) = (vertices.local.frame(lane), vertices.local.wo.get(lane));
+            let found = draw(bsdf, wo, self.lobe[0][lane], u, |wi| {
+                columns.faces_same_side(lane, frame.to_world(wi))
+            });
             self.drawn.goes_on[lane] = u32::from(found.is_some());
             if let Some(found) = found {
                 self.drawn.wi.set(lane, found.wi);
@@ -164,50 +147,6 @@ impl Continuations {
             next.push(ray, state);
         }
     }
-}
-
-/// A direction drawn from a BSDF.
-struct Direction {
-    wi: Vec3,
-    weight: Vec3,
-    /// `None` for a delta lobe.
-    pdf: Option<f32>,
-    eta: f32,
-}
-
-/// Draws a direction from any BSDF. `None` where the path ends.
-fn draw(
-    bsdf: &Bsdf,
-    vertices: &Vertices,
-    surfaces: &Surfaces,
-    lane: usize,
-    mut lobe: f32,
-    u: [f32; 2],
-) -> Option<Direction> {
-    let wo = vertices.local.wo.get(lane);
-    let delta_share = bsdf.delta_share();
-    if lobe < delta_share {
-        let sample = bsdf.sample_delta(wo, lobe / delta_share)?;
-        return Some(Direction {
-            wi: sample.wi,
-            weight: sample.weight / delta_share,
-            pdf: None,
-            eta: sample.eta,
-        });
-    }
-    if delta_share > 0.0 {
-        lobe = (lobe - delta_share) / (1.0 - delta_share);
-    }
-    let wi = bsdf.sample(wo, lobe, u)?;
-    let same_side = surfaces.faces_same_side(lane, vertices.local.frame(lane).to_world(wi));
-    let evaluation = bsdf.evaluate(wo, wi, same_side);
-    let pdf = evaluation.pdf * (1.0 - delta_share);
-    (pdf != 0.0).then(|| Direction {
-        wi,
-        weight: evaluation.value * (wi.z.abs() / pdf),
-        pdf: Some(pdf),
-        eta: if wo.z * wi.z < 0.0 { bsdf.eta() } else { 1.0 },
-    })
 }
 
 /// Directions of Lambert reflectors.

@@ -1,11 +1,13 @@
 //! Points where paths scatter.
 
+use std::borrow::Cow;
+
 use antumbra::Isa;
 use glam::Vec3;
 
 use super::super::Batch;
 use super::super::arrival::Points;
-use super::{Hits, Origin, Paths, State, World, emitted_light, neighbours, shading_frame};
+use super::{Hits, Origin, Paths, Surface, World, emitted_light, shade};
 use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
 use crate::light::Asked;
 use crate::material::Material;
@@ -215,15 +217,10 @@ impl Vertices {
         for (lane, &place) in places.iter().enumerate() {
             let index = place as usize;
             let state = &current.states[index];
-            let State {
-                sample,
-                throughput,
-                ref origin,
-                ..
-            } = *state;
+            let (sample, throughput) = (state.sample, state.throughput);
             let shape = block.hit[lane].shape as usize;
             let emitted = if world.lights.emitter(shape).is_some() {
-                emitted_light(world, origin, &block.surface(lane))
+                emitted_light(world, &state.origin, &block.surface(lane))
             } else {
                 Vec3::ZERO
             };
@@ -234,38 +231,28 @@ impl Vertices {
             }
             let material = world.shapes[shape].material;
             let bsdf = match &world.materials[material] {
-                Material::Constant(bsdf) => {
-                    if bsdf.is_anisotropic() {
-                        let surface = block.surface(lane);
-                        let frame = shading_frame(world, bsdf, &surface);
-                        self.local.set(lane, frame, surface.wo);
-                    }
-                    bsdf
+                Material::None => {
+                    current.go_through(index, &block.surface(lane), through);
+                    continue;
                 }
-                Material::Varying(varying) => {
-                    let Some(hit) = hits.hit(index) else {
+                Material::Constant(bsdf) if !bsdf.is_anisotropic() => bsdf,
+                _ => {
+                    let surface = block.surface(lane);
+                    let own = (&current.rays[index], sample, meeting.from_camera);
+                    let found = hits
+                        .hit(index)
+                        .and_then(|hit| shade(world, batch, own, &surface, hit));
+                    let Some((bsdf, frame)) = found else {
                         continue;
                     };
-                    let surface = block.surface(lane);
-                    let ray = &current.rays[index];
-                    let own = (ray, current.states[index].sample);
-                    let neighbours = neighbours(world, batch, own, meeting.from_camera);
-                    let (bsdf, frame) =
-                        varying.shade(&world.shapes, &surface, hit, neighbours.as_ref());
                     self.local.set(lane, frame, surface.wo);
-                    self.made.push(bsdf);
-                    &self.made[self.made.len() - 1]
-                }
-                Material::None => {
-                    let origin = match origin {
-                        Origin::Certain => Origin::Certain,
-                        Origin::Scattered { .. } | Origin::Hidden => Origin::Hidden,
-                    };
-                    let ray = block
-                        .surface(lane)
-                        .ray_along(current.rays[index].dir.into());
-                    through.push(ray, State { origin, ..*state });
-                    continue;
+                    match bsdf {
+                        Cow::Borrowed(bsdf) => bsdf,
+                        Cow::Owned(bsdf) => {
+                            self.made.push(bsdf);
+                            &self.made[self.made.len() - 1]
+                        }
+                    }
                 }
             };
             if bsdf.is_black() {
@@ -289,6 +276,17 @@ impl Vertices {
             self.expansion[lane] = state.expansion;
             self.streams.set(lane, &batch.streams[sample as usize]);
         }
+    }
+}
+
+impl Paths {
+    /// Lets a path go on through a surface without a material.
+    fn go_through(&self, index: usize, surface: &Surface, through: &mut Paths) {
+        let mut state = self.states[index];
+        if let Origin::Scattered { .. } = state.origin {
+            state.origin = Origin::Hidden;
+        }
+        through.push(surface.ray_along(self.rays[index].dir.into()), state);
     }
 }
 

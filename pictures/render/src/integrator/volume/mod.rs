@@ -21,7 +21,7 @@ use glam::Vec3;
 use super::hits::Hits;
 use super::path::{DIRECTION, LIGHT, LIGHT_CHOICE, LOBE, ROULETTE, ROULETTE_DEPTH};
 use super::path::{
-    Origin, emitted_light, escaped_light, first_dimension, neighbours, receiver, shading_frame,
+    Origin, Paths, draw, emitted_light, escaped_light, first_dimension, receiver, shade,
 };
 use super::tracer::Tracer;
 use super::{Batch, power_heuristic};
@@ -43,17 +43,10 @@ const TRACKING: u32 = 0x8000_0000;
 pub struct VolumePathTracer {
     max_depth: u32,
     rr_threshold: f32,
-    current: Paths,
-    next: Paths,
+    current: Paths<State>,
+    next: Paths<State>,
     hits: Hits,
     connections: Connections,
-}
-
-/// Paths under way.
-#[derive(Debug, Default)]
-struct Paths {
-    rays: Vec<Ray>,
-    states: Vec<State>,
 }
 
 /// A path beside its ray.
@@ -74,28 +67,6 @@ struct State {
     random: Random,
     /// Whether the ray comes straight from the camera.
     from_camera: bool,
-}
-
-impl Paths {
-    fn clear(&mut self) {
-        self.rays.clear();
-        self.states.clear();
-    }
-
-    fn push(&mut self, ray: Ray, state: State) {
-        self.rays.push(ray);
-        self.states.push(state);
-    }
-}
-
-/// Direction in which a path goes on.
-struct Continuation {
-    /// Direction in the frame of the surface.
-    wi: Vec3,
-    weight: Vec3,
-    /// `None` for a delta lobe.
-    pdf: Option<f32>,
-    eta: f32,
 }
 
 impl VolumePathTracer {
@@ -172,26 +143,17 @@ impl VolumePathTracer {
             return;
         };
         batch.emitted[sample] += state.throughput * emitted_light(world, &state.origin, &surface);
-        let made;
-        let (bsdf, frame) = match world.material(surface.shape) {
-            _ if lets_pass(world, &surface) => {
-                state.medium = medium_beyond(world, &surface, dir, state.medium);
-                state.from_camera = false;
-                if state.throughput != Vec3::ZERO {
-                    self.next.push(surface.ray_along(dir), state);
-                }
-                return;
+        let own = (&ray, state.sample, state.from_camera);
+        let Some((bsdf, frame)) = shade(world, batch, own, &surface, &hit) else {
+            state.medium = medium_beyond(world, &surface, dir, state.medium);
+            state.from_camera = false;
+            if state.throughput != Vec3::ZERO {
+                self.next.push(surface.ray_along(dir), state);
             }
-            Material::None => return,
-            Material::Constant(bsdf) => (bsdf, shading_frame(world, bsdf, &surface)),
-            Material::Varying(varying) => {
-                let near = neighbours(world, batch, (&ray, state.sample), state.from_camera);
-                made = varying.shade(&world.shapes, &surface, &hit, near.as_ref());
-                (&made.0, made.1)
-            }
+            return;
         };
         if state.depth < self.max_depth && !bsdf.is_black() {
-            self.scatter_at(world, batch, &surface, (bsdf, frame), state);
+            self.scatter_at(world, batch, &surface, (&bsdf, frame), state);
         }
     }
 
@@ -207,18 +169,14 @@ impl VolumePathTracer {
         let stream = batch.streams[state.sample as usize];
         let dimension = first_dimension(state.depth);
         let wo = frame.to_local(surface.wo);
-        let bsdf = match bsdf {
-            Bsdf::Subsurface(body) => {
-                let enters = body.chance_to_enter(wo.z);
-                if state.random.next() < enters {
-                    self.enter(world, surface, (body, frame), enters, state);
-                    return;
-                }
-                state.throughput /= 1.0 - enters;
-                &body.surface
+        if let Some(body) = bsdf.body() {
+            let enters = body.chance_to_enter(wo.z, !bsdf.is_black_surface());
+            if state.random.next() < enters {
+                self.enter(world, surface, (body, frame), enters, state);
+                return;
             }
-            bsdf => bsdf,
-        };
+            state.throughput /= 1.0 - enters;
+        }
         let at = receiver(bsdf, surface);
         let delta_share = bsdf.delta_share();
         if delta_share < 1.0
@@ -244,7 +202,8 @@ impl VolumePathTracer {
         }
         let lobe = stream.uniform(dimension.wrapping_add(LOBE));
         let u = stream.pair(dimension.wrapping_add(DIRECTION));
-        let Some(found) = continuation(bsdf, surface, &frame, wo, lobe, u) else {
+        let is_on_same_side = |wi| surface.faces_same_side(frame.to_world(wi));
+        let Some(found) = draw(bsdf, wo, lobe, u, is_on_same_side) else {
             return;
         };
         if found.eta != 1.0 {
@@ -365,38 +324,4 @@ fn light_sample(
     let u = stream.pair(dimension.wrapping_add(LIGHT));
     let sample = world.lights.all()[light].sample(at, u)?;
     (chance > 0.0).then_some((sample, chance))
-}
-
-/// Draws a direction from a BSDF. `None` where the path ends.
-fn continuation(
-    bsdf: &Bsdf,
-    surface: &Surface,
-    frame: &Frame,
-    wo: Vec3,
-    mut lobe: f32,
-    u: [f32; 2],
-) -> Option<Continuation> {
-    let delta_share = bsdf.delta_share();
-    if lobe < delta_share {
-        let sample = bsdf.sample_delta(wo, lobe / delta_share)?;
-        return Some(Continuation {
-            wi: sample.wi,
-            weight: sample.weight / delta_share,
-            pdf: None,
-            eta: sample.eta,
-        });
-    }
-    if delta_share > 0.0 {
-        lobe = (lobe - delta_share) / (1.0 - delta_share);
-    }
-    let wi = bsdf.sample(wo, lobe, u)?;
-    let same_side = surface.faces_same_side(frame.to_world(wi));
-    let found = bsdf.evaluate(wo, wi, same_side);
-    let pdf = found.pdf * (1.0 - delta_share);
-    (pdf > 0.0).then(|| Continuation {
-        wi,
-        weight: found.value * (wi.z.abs() / pdf),
-        pdf: Some(pdf),
-        eta: if wo.z * wi.z < 0.0 { bsdf.eta() } else { 1.0 },
-    })
 }

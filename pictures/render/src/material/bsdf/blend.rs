@@ -5,8 +5,8 @@ use std::f32::consts::{FRAC_1_PI, PI};
 
 use glam::Vec3;
 
-use super::cosine_side;
 use super::microfacet::TrowbridgeReitz;
+use super::{Scatter, cosine_side};
 use crate::surface::{reflect, same_hemisphere};
 
 /// Base and coat in one lobe, since each takes from the other.
@@ -33,25 +33,22 @@ impl Blend {
             facets,
         }
     }
+}
 
-    /// Whether the roughness along x and y differs.
-    pub fn is_anisotropic(&self) -> bool {
-        self.facets.is_anisotropic()
-    }
-
-    /// Whether nothing is reflected in any direction.
-    pub fn is_black(&self) -> bool {
+impl Scatter for Blend {
+    fn is_black(&self) -> bool {
         self.scale == Vec3::ZERO
     }
 
-    /// BRDF with all values multiplied by `scale`.
-    pub fn scaled(mut self, scale: Vec3) -> Self {
-        self.scale *= scale;
-        self
+    fn scale(&mut self, by: Vec3) {
+        self.scale *= by;
     }
 
-    /// Value of the BRDF. The caller checks the sides of the directions.
-    pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+    fn is_anisotropic(&self) -> bool {
+        self.facets.is_anisotropic()
+    }
+
+    fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let (cos_o, cos_i) = (wo.z.abs(), wi.z.abs());
         let h = wo + wi;
         if h == Vec3::ZERO {
@@ -68,8 +65,7 @@ impl Blend {
         self.scale * (base + coat)
     }
 
-    /// Density of [`Self::sample`].
-    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         if !same_hemisphere(wo, wi) {
             return 0.0;
         }
@@ -79,7 +75,7 @@ impl Blend {
     }
 
     /// Direction for the base or for the coat, by `choice` in `[0, 1)`.
-    pub fn sample(&self, wo: Vec3, choice: f32, u: [f32; 2]) -> Option<Vec3> {
+    fn sample(&self, wo: Vec3, choice: f32, u: [f32; 2]) -> Option<Vec3> {
         if choice < 0.5 {
             return Some(cosine_side(wo, u));
         }

@@ -4,6 +4,7 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
+use super::{Scatter, cosine_side};
 use crate::surface::same_hemisphere;
 
 /// A diffuse reflector: Lambert's, or the rough one of Oren and Nayar.
@@ -29,26 +30,24 @@ impl Diffuse {
         }
     }
 
-    /// Whether nothing is reflected.
-    pub fn is_black(&self) -> bool {
-        self.reflectance == Vec3::ZERO
-    }
-
     /// Reflectance of a Lambert reflector. `None` for a rough one.
     #[inline]
     pub fn lambert(&self) -> Option<Vec3> {
         (self.b == 0.0).then_some(self.reflectance)
     }
+}
 
-    /// Reflector with all values multiplied by `scale`.
-    pub fn scaled(mut self, scale: Vec3) -> Self {
-        self.reflectance *= scale;
-        self
+impl Scatter for Diffuse {
+    fn is_black(&self) -> bool {
+        self.reflectance == Vec3::ZERO
     }
 
-    /// Value of the BRDF. The caller checks the sides of the directions.
+    fn scale(&mut self, by: Vec3) {
+        self.reflectance *= by;
+    }
+
     #[inline]
-    pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+    fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let lambert = self.reflectance * FRAC_1_PI;
         if self.b == 0.0 {
             return lambert;
@@ -67,15 +66,39 @@ impl Diffuse {
         };
         lambert * (self.a + self.b * cos_difference * sin_alpha * tan_beta)
     }
+}
 
-    /// Density of a cosine-distributed direction on the side of `wo`.
-    #[inline]
-    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+/// Lambert on the other side, with this transmittance.
+#[derive(Clone, Copy, Debug)]
+pub struct DiffuseTransmission(pub Vec3);
+
+impl Scatter for DiffuseTransmission {
+    fn is_black(&self) -> bool {
+        self.0 == Vec3::ZERO
+    }
+
+    fn scale(&mut self, by: Vec3) {
+        self.0 *= by;
+    }
+
+    fn is_of(&self, reflects: bool) -> bool {
+        !reflects
+    }
+
+    fn value(&self, _: Vec3, _: Vec3) -> Vec3 {
+        self.0 * FRAC_1_PI
+    }
+
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         if same_hemisphere(wo, wi) {
-            wi.z.abs() * FRAC_1_PI
-        } else {
             0.0
+        } else {
+            wi.z.abs() * FRAC_1_PI
         }
+    }
+
+    fn sample(&self, wo: Vec3, _: f32, u: [f32; 2]) -> Option<Vec3> {
+        Some(cosine_side(-wo, u))
     }
 }
 

@@ -6,6 +6,7 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
 use glam::Vec3;
 
+use super::Scatter;
 use super::albedo::schlick_part;
 use crate::surface::{reflect, same_hemisphere};
 
@@ -26,25 +27,23 @@ pub struct DisneyBase {
     pub roughness: f32,
 }
 
-impl DisneyBase {
-    /// Whether nothing is reflected.
-    pub fn is_black(&self) -> bool {
+impl Scatter for DisneyBase {
+    fn is_black(&self) -> bool {
         [self.diffuse, self.flat, self.retro, self.sheen] == [Vec3::ZERO; 4]
     }
 
-    /// Base with all values multiplied by `scale`.
-    pub fn scaled(self, scale: Vec3) -> Self {
-        Self {
-            diffuse: self.diffuse * scale,
-            flat: self.flat * scale,
-            retro: self.retro * scale,
-            sheen: self.sheen * scale,
-            roughness: self.roughness,
+    fn scale(&mut self, by: Vec3) {
+        for part in [
+            &mut self.diffuse,
+            &mut self.flat,
+            &mut self.retro,
+            &mut self.sheen,
+        ] {
+            *part *= by;
         }
     }
 
-    /// Value of the BRDF. The caller checks the sides of the directions.
-    pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+    fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let (cos_o, cos_i) = (wo.z.abs(), wi.z.abs());
         let (at_o, at_i) = (schlick_part(cos_o), schlick_part(cos_i));
         // Burley 2015, equation 4.
@@ -94,26 +93,24 @@ impl Clearcoat {
         }
     }
 
-    /// Whether nothing is reflected.
-    pub fn is_black(&self) -> bool {
-        self.weight == Vec3::ZERO
-    }
-
-    /// Coat with all values multiplied by `scale`.
-    pub fn scaled(mut self, scale: Vec3) -> Self {
-        self.weight *= scale;
-        self
-    }
-
     /// Density of normals per solid angle, with the cosine: GTR of exponent 1 (Burley 2012).
     fn density(&self, h: Vec3) -> f32 {
         let sin2 = h.x * h.x + h.y * h.y;
         (self.alpha2 - 1.0)
             / (PI * libm::logf(self.alpha2) * (sin2 + self.alpha2 * (1.0 - sin2).max(0.0)))
     }
+}
 
-    /// Value of the BRDF. The caller checks the sides of the directions.
-    pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+impl Scatter for Clearcoat {
+    fn is_black(&self) -> bool {
+        self.weight == Vec3::ZERO
+    }
+
+    fn scale(&mut self, by: Vec3) {
+        self.weight *= by;
+    }
+
+    fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let Some(h) = (wo + wi).try_normalize() else {
             return Vec3::ZERO;
         };
@@ -121,8 +118,7 @@ impl Clearcoat {
         self.weight * (0.25 * masking(wo.z) * masking(wi.z) * fresnel * self.density(h))
     }
 
-    /// Density of [`Self::sample`].
-    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         if !same_hemisphere(wo, wi) {
             return 0.0;
         }
@@ -131,7 +127,7 @@ impl Clearcoat {
     }
 
     /// Mirror direction at a facet of the distribution. `None` if it ends below the surface.
-    pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<Vec3> {
+    fn sample(&self, wo: Vec3, _: f32, u: [f32; 2]) -> Option<Vec3> {
         // The distribution function of sin² is log(1 + sin² (1 / alpha² - 1)) / log(1 / alpha²).
         let grown = libm::powf(self.alpha2, 1.0 - u[0]);
         let cos2 = ((1.0 - grown) / (1.0 - self.alpha2)).clamp(0.0, 1.0);

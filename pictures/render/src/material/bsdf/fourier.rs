@@ -6,6 +6,8 @@ use std::sync::Arc;
 use antumbra_scene::FourierTable;
 use glam::Vec3;
 
+use super::Scatter;
+
 /// Scattering by a table, times a factor.
 #[derive(Clone, Debug)]
 pub struct Fourier {
@@ -154,19 +156,6 @@ impl Fourier {
         Self { table, scale }
     }
 
-    /// With all values multiplied.
-    pub fn scaled(self, scale: Vec3) -> Self {
-        Self {
-            scale: self.scale * scale,
-            ..self
-        }
-    }
-
-    /// Whether nothing is scattered.
-    pub fn is_black(&self) -> bool {
-        self.scale == Vec3::ZERO
-    }
-
     /// Weights of both cosines: where light goes on to as if it came from `wi`, and `wo`.
     fn weights(&self, wo: Vec3, wi: Vec3) -> Option<[Weights; 2]> {
         let at = |cosine| Weights::at(&self.table.cosines, cosine);
@@ -220,82 +209,6 @@ impl Fourier {
             }
         }
         Series { coefficients }
-    }
-
-    /// Value for two unit directions.
-    pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
-        let (incident, outgoing) = (-wi.z, wo.z);
-        let Some(weights) = self.weights(wo, wi) else {
-            return Vec3::ZERO;
-        };
-        let cos = cos_between(-wi, wo);
-        let luminance = self.channel(&weights, 0, cos).max(0.0);
-        // Series hold the cosine.
-        let mut scale = if incident == 0.0 {
-            0.0
-        } else {
-            1.0 / incident.abs()
-        };
-        // Radiance is squeezed where it goes over to another medium.
-        if incident * outgoing > 0.0 {
-            let eta = match incident > 0.0 {
-                true => 1.0 / self.table.eta,
-                false => self.table.eta,
-            };
-            scale *= eta * eta;
-        }
-        let color = match self.table.channels {
-            1 => Vec3::splat(luminance),
-            _ => {
-                let [red, blue] = [1, 2].map(|channel| self.channel(&weights, channel, cos));
-                // From the luminance of sRGB, as rounded by pbrt-v3.
-                let green = 1.39829 * luminance - 0.100913 * blue - 0.297375 * red;
-                Vec3::new(red, green, blue)
-            }
-        };
-        (color * scale).max(Vec3::ZERO) * self.scale
-    }
-
-    /// Density of a direction in [`Self::sample`].
-    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
-        let Some(weights) = self.weights(wo, wi) else {
-            return 0.0;
-        };
-        let luminance = self.channel(&weights, 0, cos_between(-wi, wo));
-        let count = self.table.cosines.len();
-        let all: f32 = weights[1]
-            .iter()
-            .map(|(row, weight)| weight * self.table.integrals[row * count + count - 1] * TAU)
-            .sum();
-        if all > 0.0 && luminance > 0.0 {
-            luminance / all
-        } else {
-            0.0
-        }
-    }
-
-    /// Direction by the luminance of the table.
-    pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<Vec3> {
-        let outgoing = Weights::at(&self.table.cosines, wo.z)?;
-        let cosine = self.sample_cosine(&outgoing, u[1])?;
-        let incident = Weights::at(&self.table.cosines, cosine)?;
-        let series = self.series(&[incident, outgoing]);
-        if !(series.coefficients.first().copied().unwrap_or(0.0) > 0.0) {
-            return None;
-        }
-        let (sin_phi, cos_phi) = libm::sincosf(series.sample(u[0]));
-        let sin = (1.0 - cosine * cosine).max(0.0).sqrt();
-        let across = wo.truncate().length();
-        let [x, y] = match across > 0.0 {
-            true => [wo.x / across, wo.y / across],
-            false => [1.0, 0.0],
-        };
-        let wi = -Vec3::new(
-            sin * (cos_phi * x - sin_phi * y),
-            sin * (sin_phi * x + cos_phi * y),
-            cosine,
-        );
-        wi.try_normalize()
     }
 
     /// Incident cosine by the mean over the azimuth: the spline between the rows of the table is inverted.
@@ -369,6 +282,96 @@ impl Fourier {
             t -= off / value;
         }
         Some((x0 + width * t).clamp(cosines[0], cosines[count - 1]))
+    }
+}
+
+impl Scatter for Fourier {
+    fn is_black(&self) -> bool {
+        self.scale == Vec3::ZERO
+    }
+
+    fn scale(&mut self, by: Vec3) {
+        self.scale *= by;
+    }
+
+    fn is_of(&self, _: bool) -> bool {
+        true
+    }
+
+    /// Value for two unit directions.
+    fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        let (incident, outgoing) = (-wi.z, wo.z);
+        let Some(weights) = self.weights(wo, wi) else {
+            return Vec3::ZERO;
+        };
+        let cos = cos_between(-wi, wo);
+        let luminance = self.channel(&weights, 0, cos).max(0.0);
+        // Series hold the cosine.
+        let mut scale = if incident == 0.0 {
+            0.0
+        } else {
+            1.0 / incident.abs()
+        };
+        // Radiance is squeezed where it goes over to another medium.
+        if incident * outgoing > 0.0 {
+            let eta = match incident > 0.0 {
+                true => 1.0 / self.table.eta,
+                false => self.table.eta,
+            };
+            scale *= eta * eta;
+        }
+        let color = match self.table.channels {
+            1 => Vec3::splat(luminance),
+            _ => {
+                let [red, blue] = [1, 2].map(|channel| self.channel(&weights, channel, cos));
+                // From the luminance of sRGB, as rounded by pbrt-v3.
+                let green = 1.39829 * luminance - 0.100913 * blue - 0.297375 * red;
+                Vec3::new(red, green, blue)
+            }
+        };
+        (color * scale).max(Vec3::ZERO) * self.scale
+    }
+
+    /// Density of a direction in [`Self::sample`].
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        let Some(weights) = self.weights(wo, wi) else {
+            return 0.0;
+        };
+        let luminance = self.channel(&weights, 0, cos_between(-wi, wo));
+        let count = self.table.cosines.len();
+        let all: f32 = weights[1]
+            .iter()
+            .map(|(row, weight)| weight * self.table.integrals[row * count + count - 1] * TAU)
+            .sum();
+        if all > 0.0 && luminance > 0.0 {
+            luminance / all
+        } else {
+            0.0
+        }
+    }
+
+    /// Direction by the luminance of the table.
+    fn sample(&self, wo: Vec3, _: f32, u: [f32; 2]) -> Option<Vec3> {
+        let outgoing = Weights::at(&self.table.cosines, wo.z)?;
+        let cosine = self.sample_cosine(&outgoing, u[1])?;
+        let incident = Weights::at(&self.table.cosines, cosine)?;
+        let series = self.series(&[incident, outgoing]);
+        if !(series.coefficients.first().copied().unwrap_or(0.0) > 0.0) {
+            return None;
+        }
+        let (sin_phi, cos_phi) = libm::sincosf(series.sample(u[0]));
+        let sin = (1.0 - cosine * cosine).max(0.0).sqrt();
+        let across = wo.truncate().length();
+        let [x, y] = match across > 0.0 {
+            true => [wo.x / across, wo.y / across],
+            false => [1.0, 0.0],
+        };
+        let wi = -Vec3::new(
+            sin * (cos_phi * x - sin_phi * y),
+            sin * (sin_phi * x + cos_phi * y),
+            cosine,
+        );
+        wi.try_normalize()
     }
 }
 
@@ -464,7 +467,7 @@ mod tests {
                 for index in 0..side * side {
                     let place = |i: usize| (i as f32 + 0.5) / side as f32;
                     let u = [place(index % side), place(index / side)];
-                    let wi = lobe.sample(wo, u).expect("the function is positive");
+                    let wi = lobe.sample(wo, 0.0, u).expect("the function is positive");
                     assert!((wi.length() - 1.0).abs() < 1e-5);
                     found += f64::from(test(wi));
                 }

@@ -3,6 +3,7 @@
 
 use glam::Vec3;
 
+use super::Scatter;
 use super::albedo::schlick_part;
 use super::fresnel::{Fresnel, coated, conductor, dielectric};
 use super::microfacet::TrowbridgeReitz;
@@ -25,25 +26,23 @@ impl GlossyReflection {
             fresnel,
         }
     }
+}
 
-    /// Whether nothing is reflected.
-    pub fn is_black(&self) -> bool {
+impl Scatter for GlossyReflection {
+    fn is_black(&self) -> bool {
         self.scale == Vec3::ZERO
     }
 
-    /// Lobe with all values multiplied by `scale`.
-    pub fn scaled(mut self, scale: Vec3) -> Self {
-        self.scale *= scale;
-        self
+    fn scale(&mut self, by: Vec3) {
+        self.scale *= by;
     }
 
-    /// Whether the roughness along x and y differs.
-    pub fn is_anisotropic(&self) -> bool {
+    fn is_anisotropic(&self) -> bool {
         self.facets.is_anisotropic()
     }
 
     /// Value of the BRDF. 0 at grazing angles, and where no facet mirrors one direction to the other.
-    pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+    fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let h = wo + wi;
         if wo.z == 0.0 || wi.z == 0.0 || h == Vec3::ZERO {
             return Vec3::ZERO;
@@ -75,8 +74,7 @@ impl GlossyReflection {
         }
     }
 
-    /// Density of [`Self::sample`].
-    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         if !same_hemisphere(wo, wi) {
             return 0.0;
         }
@@ -85,7 +83,7 @@ impl GlossyReflection {
     }
 
     /// Mirror direction at a visible facet. `None` if it ends below the surface.
-    pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<Vec3> {
+    fn sample(&self, wo: Vec3, _: f32, u: [f32; 2]) -> Option<Vec3> {
         let h = self.facets.sample(wo, u);
         let wi = reflect(wo, h);
         (wo.dot(h) > 0.0 && same_hemisphere(wo, wi)).then_some(wi)
@@ -114,27 +112,6 @@ impl GlossyTransmission {
         Self { scale, facets, eta }
     }
 
-    /// Whether nothing is transmitted.
-    pub fn is_black(&self) -> bool {
-        self.scale == Vec3::ZERO
-    }
-
-    /// Lobe with all values multiplied by `scale`.
-    pub fn scaled(mut self, scale: Vec3) -> Self {
-        self.scale *= scale;
-        self
-    }
-
-    /// Whether the roughness along x and y differs.
-    pub fn is_anisotropic(&self) -> bool {
-        self.facets.is_anisotropic()
-    }
-
-    /// Index of refraction below the normal over that above it.
-    pub fn eta(&self) -> f32 {
-        self.eta
-    }
-
     /// Normal, on the upper side, of the facet that refracts one direction into the other. Beside it, the index on
     /// the side of `wi` over that on the side of `wo`. `None` where there is no such facet.
     fn facet(&self, wo: Vec3, wi: Vec3) -> Option<(Vec3, f32)> {
@@ -148,9 +125,31 @@ impl GlossyTransmission {
         // directions that it never samples.) NaN, from index 1 and opposite directions, is no facet.
         (wo.dot(h) * wo.z > 0.0 && wi.dot(h) * wi.z > 0.0).then_some((h, eta))
     }
+}
+
+impl Scatter for GlossyTransmission {
+    fn is_black(&self) -> bool {
+        self.scale == Vec3::ZERO
+    }
+
+    fn scale(&mut self, by: Vec3) {
+        self.scale *= by;
+    }
+
+    fn is_of(&self, reflects: bool) -> bool {
+        !reflects
+    }
+
+    fn is_anisotropic(&self) -> bool {
+        self.facets.is_anisotropic()
+    }
+
+    fn eta(&self) -> f32 {
+        self.eta
+    }
 
     /// Value of the BTDF, for radiance.
-    pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+    fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
         let Some((h, eta)) = self.facet(wo, wi) else {
             return Vec3::ZERO;
         };
@@ -163,8 +162,7 @@ impl GlossyTransmission {
         self.scale * (passed * (geometry * ratio).abs())
     }
 
-    /// Density of [`Self::sample`].
-    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         let Some((h, eta)) = self.facet(wo, wi) else {
             return 0.0;
         };
@@ -174,7 +172,7 @@ impl GlossyTransmission {
     }
 
     /// Direction refracted at a visible facet. `None` under total reflection.
-    pub fn sample(&self, wo: Vec3, u: [f32; 2]) -> Option<Vec3> {
+    fn sample(&self, wo: Vec3, _: f32, u: [f32; 2]) -> Option<Vec3> {
         let h = self.facets.sample(wo, u);
         if wo.dot(h) <= 0.0 {
             return None;

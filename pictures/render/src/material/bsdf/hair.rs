@@ -9,8 +9,8 @@ use std::f32::consts::{PI, TAU};
 
 use glam::Vec3;
 
-use super::Evaluation;
 use super::fresnel::dielectric;
+use super::{Evaluation, Scatter};
 use crate::color::luminance;
 
 /// Number of kinds of paths through the hair. The last stands for all that are longer.
@@ -80,19 +80,6 @@ impl Hair {
         }
     }
 
-    /// Lobe with all values multiplied by `scale`.
-    pub fn scaled(self, scale: Vec3) -> Self {
-        Self {
-            scale: self.scale * scale,
-            ..self
-        }
-    }
-
-    /// Whether nothing is scattered.
-    pub fn is_black(&self) -> bool {
-        self.scale == Vec3::ZERO
-    }
-
     fn viewed(&self, wo: Vec3) -> Viewed {
         let sin = wo.x.clamp(-1.0, 1.0);
         let cos = safe_root(1.0 - sin * sin).max(1e-6);
@@ -120,8 +107,41 @@ impl Hair {
         }
     }
 
+    /// Sine and cosine of the viewer's angle along the hair, tilted for a path.
+    fn tilted(&self, path: usize, viewed: &Viewed) -> [f32; 2] {
+        let [sin, cos] = self.tilts[path];
+        let tilted = viewed.cos * cos - viewed.sin * sin;
+        [viewed.sin * cos + viewed.cos * sin, tilted.abs()]
+    }
+}
+
+impl Scatter for Hair {
+    fn is_black(&self) -> bool {
+        self.scale == Vec3::ZERO
+    }
+
+    fn scale(&mut self, by: Vec3) {
+        self.scale *= by;
+    }
+
+    fn is_of(&self, _: bool) -> bool {
+        true
+    }
+
+    fn is_anisotropic(&self) -> bool {
+        true
+    }
+
+    fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        self.evaluate(wo, wi).value
+    }
+
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+        self.evaluate(wo, wi).pdf
+    }
+
     /// Value without the cosine, and density of [`Self::sample`].
-    pub fn evaluate(&self, wo: Vec3, wi: Vec3) -> Evaluation {
+    fn evaluate(&self, wo: Vec3, wi: Vec3) -> Evaluation {
         let viewed = self.viewed(wo);
         let sin = wi.x.clamp(-1.0, 1.0);
         let cos = safe_root(1.0 - sin * sin);
@@ -143,7 +163,7 @@ impl Hair {
     }
 
     /// Direction drawn with the density of [`Self::evaluate`], by a choice of the path in `[0, 1)` and a place.
-    pub fn sample(&self, wo: Vec3, choice: f32, [u, v]: [f32; 2]) -> Option<Vec3> {
+    fn sample(&self, wo: Vec3, choice: f32, [u, v]: [f32; 2]) -> Option<Vec3> {
         let viewed = self.viewed(wo);
         let (mut path, mut rest) = (0, choice);
         let chances = viewed.chances();
@@ -172,13 +192,6 @@ impl Hair {
             cos_along * libm::sinf(phi),
         );
         wi.is_finite().then_some(wi)
-    }
-
-    /// Sine and cosine of the viewer's angle along the hair, tilted for a path.
-    fn tilted(&self, path: usize, viewed: &Viewed) -> [f32; 2] {
-        let [sin, cos] = self.tilts[path];
-        let tilted = viewed.cos * cos - viewed.sin * sin;
-        [viewed.sin * cos + viewed.cos * sin, tilted.abs()]
     }
 }
 

@@ -10,28 +10,16 @@
 
 use std::f32::consts::FRAC_1_PI;
 
+use antumbra_scene::material;
 use glam::Vec3;
 
 use super::albedo::{CoatAlbedo, schlick_part};
-use super::cosine_side;
 use super::microfacet::TrowbridgeReitz;
+use super::{Scatter, cosine_side};
 use crate::color::luminance;
 use crate::surface::{reflect, same_hemisphere};
 
-/// Parameters of a [`Metallic`], as in glTF 2.0.
-#[derive(Clone, Copy, Debug)]
-pub struct MetallicParameters {
-    /// Colour of the base and of the metal.
-    pub color: Vec3,
-    /// Share of metal, 0..=1.
-    pub metallic: f32,
-    /// Perceptual roughness, 0..=1. Its square is the microfacet alpha.
-    pub roughness: f32,
-    /// Reflectance of the dielectric at normal incidence.
-    pub coat: Vec3,
-    /// Share of the base that is transparent, 0..=1.
-    pub transparent: f32,
-}
+type Parameters = material::Metallic<crate::material::Here>;
 
 /// Coat, base and metal in one lobe.
 #[derive(Clone, Copy, Debug)]
@@ -58,12 +46,12 @@ fn grazing(coat: Vec3) -> f32 {
 impl Metallic {
     /// The lobe, and the share of light that goes straight on through the base, still to be multiplied by what the coat
     /// lets pass. Parameters are clamped to 0..=1.
-    pub fn new(parameters: MetallicParameters) -> (Self, Vec3) {
+    pub fn new(parameters: &Parameters) -> (Self, Vec3) {
         let color = parameters.color.clamp(Vec3::ZERO, Vec3::ONE);
         let coat = parameters.coat.clamp(Vec3::ZERO, Vec3::ONE);
         let share = |value: f32| value.clamp(0.0, 1.0);
         let (metallic, roughness) = (share(parameters.metallic), share(parameters.roughness));
-        let transparent = share(parameters.transparent);
+        let transparent = share(parameters.transmission);
         let dielectric = color * (1.0 - metallic);
         let albedo = CoatAlbedo::of(roughness);
         let alpha = roughness * roughness;
@@ -88,12 +76,12 @@ impl Metallic {
     pub fn coated(base: Vec3, eta: f32, alpha: f32) -> Self {
         let eta = if eta >= 1.0 { eta } else { 1.0 / eta.max(1e-3) };
         let straight = (eta - 1.0) / (eta + 1.0);
-        let (mut lobe, _) = Self::new(MetallicParameters {
+        let (mut lobe, _) = Self::new(&Parameters {
             color: base,
             metallic: 0.0,
             roughness: alpha.max(0.0).sqrt(),
             coat: Vec3::splat(straight * straight),
-            transparent: 0.0,
+            transmission: 0.0,
         });
         let out = lobe.coat().mean_passed() / (eta * eta);
         lobe.base = lobe.base * out / (Vec3::ONE - lobe.base * (Vec3::ONE - out));
@@ -107,18 +95,6 @@ impl Metallic {
             f90: self.f90[1],
             albedo: self.albedo,
         }
-    }
-
-    /// Whether nothing is reflected in any direction.
-    pub fn is_black(&self) -> bool {
-        self.scale == Vec3::ZERO
-            || (self.f0 == Vec3::ZERO && self.f90[0] == 0.0 && self.base == Vec3::ZERO)
-    }
-
-    /// Lobe with all values multiplied by `scale`.
-    pub fn scaled(mut self, scale: Vec3) -> Self {
-        self.scale *= scale;
-        self
     }
 
     /// Base and light between facets, for cosines to the normal: the part without highlight.
@@ -136,21 +112,6 @@ impl Metallic {
         sum * FRAC_1_PI
     }
 
-    /// Value of the BRDF. The caller checks the sides of the directions.
-    pub fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
-        let h = wo + wi;
-        if wo.z == 0.0 || wi.z == 0.0 || h == Vec3::ZERO {
-            return Vec3::ZERO;
-        }
-        let spread = self.spread(wo.z.abs(), wi.z.abs());
-        let h = h.normalize();
-        let grazing = schlick_part(wi.dot(h).abs());
-        let fresnel = self.f0 + (Vec3::splat(self.f90[0]) - self.f0) * grazing;
-        let geometry = self.facets.density(h) * self.facets.masking_shadowing(wo, wi);
-        let highlight = fresnel * (geometry / (4.0 * (wo.z * wi.z).abs()));
-        self.scale * (spread + highlight)
-    }
-
     /// Probability of sampling the highlight, by the light that each part reflects.
     fn highlight_share(&self, wo: Vec3) -> f32 {
         let cos = wo.z.abs();
@@ -166,9 +127,33 @@ impl Metallic {
         }
         (highlight / (highlight + spread)).clamp(0.1, 0.9)
     }
+}
 
-    /// Density of [`Self::sample`].
-    pub fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
+impl Scatter for Metallic {
+    fn is_black(&self) -> bool {
+        self.scale == Vec3::ZERO
+            || (self.f0 == Vec3::ZERO && self.f90[0] == 0.0 && self.base == Vec3::ZERO)
+    }
+
+    fn scale(&mut self, by: Vec3) {
+        self.scale *= by;
+    }
+
+    fn value(&self, wo: Vec3, wi: Vec3) -> Vec3 {
+        let h = wo + wi;
+        if wo.z == 0.0 || wi.z == 0.0 || h == Vec3::ZERO {
+            return Vec3::ZERO;
+        }
+        let spread = self.spread(wo.z.abs(), wi.z.abs());
+        let h = h.normalize();
+        let grazing = schlick_part(wi.dot(h).abs());
+        let fresnel = self.f0 + (Vec3::splat(self.f90[0]) - self.f0) * grazing;
+        let geometry = self.facets.density(h) * self.facets.masking_shadowing(wo, wi);
+        let highlight = fresnel * (geometry / (4.0 * (wo.z * wi.z).abs()));
+        self.scale * (spread + highlight)
+    }
+
+    fn pdf(&self, wo: Vec3, wi: Vec3) -> f32 {
         if !same_hemisphere(wo, wi) {
             return 0.0;
         }
@@ -180,7 +165,7 @@ impl Metallic {
     }
 
     /// Direction for the highlight or for the rest, by `choice` in `[0, 1)`.
-    pub fn sample(&self, wo: Vec3, choice: f32, u: [f32; 2]) -> Option<Vec3> {
+    fn sample(&self, wo: Vec3, choice: f32, u: [f32; 2]) -> Option<Vec3> {
         if choice >= self.highlight_share(wo) {
             return Some(cosine_side(wo, u));
         }

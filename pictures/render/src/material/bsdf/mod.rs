@@ -1,7 +1,7 @@
 //! How surfaces scatter light, in the local frame whose z axis is the shading normal.
 //!
-//! - [`Bsdf`]: how one point scatters: evaluate, sample and the delta lobes
-//! - `lobe.rs`: any number of lobes side by side
+//! - [`Bsdf`]: how one point scatters, by any number of lobes: evaluate, sample and the delta lobes
+//! - `lobe.rs`: what all lobes have in common, and their list
 //! - `fresnel.rs`: reflectance of smooth interfaces
 //! - `microfacet.rs`: the Trowbridge-Reitz (GGX) distribution of facets
 //! - `diffuse.rs`: Lambert and Oren-Nayar
@@ -37,47 +37,35 @@ mod subsurface;
 use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
+use smallvec::SmallVec;
 
 use crate::columns::select;
 use crate::sampler::warp::cosine_hemisphere;
 use crate::surface::same_hemisphere;
 pub use blend::Blend;
-pub use diffuse::Diffuse;
+pub use diffuse::{Diffuse, DiffuseTransmission};
 pub use disney::{Clearcoat, DisneyBase};
 pub use fourier::Fourier;
 pub use fresnel::Fresnel;
 pub use glossy::{GlossyReflection, GlossyTransmission};
 pub use hair::{Hair, absorption_of_color, absorption_of_melanin};
-pub use lobe::{Lobe, Lobes};
-pub use metallic::{Coat, Metallic, MetallicParameters};
+pub use lobe::{Lobe, Scatter};
+pub use metallic::{Coat, Metallic};
 pub use microfacet::TrowbridgeReitz;
 pub use specular::{Specular, SpecularSample};
 pub use subsurface::{Interface, Subsurface, albedo_of};
 
-/// How a point of a surface scatters light.
+/// How a point of a surface scatters light: lobes that are *spread* over directions, and *delta* lobes, each of which has a
+/// single direction that no other technique finds.
 ///
-/// Lobes are *spread* over directions, or *delta*: a single direction that no other technique finds. Most materials
-/// have one kind. The share of delta lobes decides how often to sample which kind.
-#[derive(Clone, Debug)]
-pub enum Bsdf {
-    /// Absorbs everything.
-    Black,
-    /// Lambert or Oren-Nayar.
-    Diffuse(Diffuse),
-    /// Only microfacet reflection.
-    Glossy(GlossyReflection),
-    /// A diffuse base and a microfacet coat, added.
-    Plastic(Diffuse, GlossyReflection),
-    /// A rough dielectric interface. A lobe with black scale is absent.
-    RoughGlass(Option<GlossyReflection>, Option<GlossyTransmission>),
-    /// Coat, base and metal by glTF's model.
-    Metallic(Metallic),
-    /// A mirror or a smooth dielectric: only delta lobes.
-    Specular(Specular),
-    /// A surface above a body in which light wanders. Here only the surface counts.
-    Subsurface(Box<Subsurface>),
-    /// Anything else.
-    Lobes(Lobes),
+/// Values of spread lobes add up, and each is equally likely to be sampled. The share of delta lobes decides how often to
+/// sample which kind.
+#[derive(Clone, Debug, Default)]
+pub struct Bsdf {
+    /// Lobes that are not black.
+    spread: SmallVec<[Lobe; 2]>,
+    deltas: Vec<Specular>,
+    body: Option<Box<Subsurface>>,
 }
 
 /// Value and density of scattering between two directions.
@@ -89,145 +77,108 @@ pub struct Evaluation {
     pub pdf: f32,
 }
 
+/// Index below `count`, and the rest of the number that chose it.
+fn choose(choice: f32, count: usize) -> (usize, f32) {
+    if count == 1 {
+        return (0, choice);
+    }
+    let scaled = choice * count as f32;
+    let index = (scaled as usize).min(count - 1);
+    (index, (scaled - index as f32).min(1.0 - f32::EPSILON))
+}
+
 impl Bsdf {
-    /// Lambert or Oren-Nayar.
-    pub fn diffuse(base: Diffuse) -> Self {
-        if base.is_black() {
-            Self::Black
-        } else {
-            Self::Diffuse(base)
-        }
+    /// Absorbs everything.
+    pub fn black() -> Self {
+        Self::default()
     }
 
-    /// A base and a coat.
-    pub fn plastic(base: Diffuse, coat: GlossyReflection) -> Self {
-        match (base.is_black(), coat.is_black()) {
-            (_, true) => Self::diffuse(base),
-            (true, false) => Self::Glossy(coat),
-            (false, false) => Self::Plastic(base, coat),
+    /// Adds a lobe that spreads light, unless it is black.
+    pub fn with(mut self, lobe: impl Into<Lobe>) -> Self {
+        let lobe = lobe.into();
+        if !lobe.is_black() {
+            self.spread.push(lobe);
         }
+        self
     }
 
-    /// Coat, base and metal.
-    pub fn metallic(lobe: Metallic) -> Self {
-        if lobe.is_black() {
-            Self::Black
-        } else {
-            Self::Metallic(lobe)
+    /// Adds a delta lobe, unless it is black.
+    pub fn with_delta(mut self, lobe: Specular) -> Self {
+        if !lobe.is_black() {
+            self.deltas.push(lobe);
         }
+        self
     }
 
-    /// A rough dielectric. Lobes that are black are left out.
-    pub fn rough_glass(reflection: GlossyReflection, transmission: GlossyTransmission) -> Self {
-        if reflection.is_black() && transmission.is_black() {
-            return Self::Black;
-        }
-        Self::RoughGlass(
-            Some(reflection).filter(|lobe| !lobe.is_black()),
-            Some(transmission).filter(|lobe| !lobe.is_black()),
-        )
+    /// Adds a body below the surface, in which light wanders.
+    pub fn above(mut self, body: Subsurface) -> Self {
+        self.body = Some(Box::new(body));
+        self
     }
 
-    /// Only delta lobes.
-    pub fn specular(specular: Specular) -> Self {
-        if specular.is_black() {
-            Self::Black
-        } else {
-            Self::Specular(specular)
+    /// Adds the lobes of another surface, with all values multiplied by `scale`.
+    pub fn with_scaled(mut self, other: Self, scale: Vec3) -> Self {
+        for mut lobe in other.spread {
+            lobe.scale(scale);
+            self = self.with(lobe);
         }
+        let deltas = other.deltas.into_iter();
+        deltas.fold(self, |sum, lobe| sum.with_delta(lobe.scaled(scale)))
     }
 
-    /// Lobes side by side.
-    pub fn lobes(lobes: Vec<Lobe>) -> Self {
-        let lobes = Lobes::new(lobes);
-        match lobes.as_slice() {
-            [] => Self::Black,
-            [Lobe::Diffuse(base)] => Self::Diffuse(*base),
-            [Lobe::Glossy(coat)] => Self::Glossy(*coat),
-            [Lobe::Diffuse(base), Lobe::Glossy(coat)] => Self::Plastic(*base, *coat),
-            [Lobe::Metallic(metallic)] => Self::Metallic(*metallic),
-            [Lobe::Specular(specular)] => Self::Specular(*specular),
-            _ => Self::Lobes(lobes),
-        }
-    }
-
-    /// Lobes one by one.
-    pub fn into_lobes(self) -> Vec<Lobe> {
-        match self {
-            Self::Black => Vec::new(),
-            Self::Diffuse(base) => vec![Lobe::Diffuse(base)],
-            Self::Glossy(coat) => vec![Lobe::Glossy(coat)],
-            Self::Plastic(base, coat) => vec![Lobe::Diffuse(base), Lobe::Glossy(coat)],
-            Self::RoughGlass(reflection, transmission) => {
-                let reflection = reflection.map(Lobe::Glossy);
-                let transmission = transmission.map(Lobe::GlossyTransmission);
-                reflection.into_iter().chain(transmission).collect()
-            }
-            Self::Metallic(metallic) => vec![Lobe::Metallic(metallic)],
-            Self::Specular(specular) => vec![Lobe::Specular(specular)],
-            Self::Subsurface(body) => body.surface.into_lobes(),
-            Self::Lobes(lobes) => lobes.into_vec(),
-        }
+    /// Body below the surface. All other methods are about the surface above it.
+    #[inline]
+    pub fn body(&self) -> Option<&Subsurface> {
+        self.body.as_deref()
     }
 
     /// Reflectance, if this is a Lambert reflector and nothing else.
     #[inline]
     pub fn lambert(&self) -> Option<Vec3> {
-        match self {
-            Self::Diffuse(base) => base.lambert(),
+        match &self.spread[..] {
+            [Lobe::Diffuse(base)] if self.deltas.is_empty() => base.lambert(),
             _ => None,
         }
     }
 
-    /// Whether nothing is ever scattered.
+    /// Whether nothing is ever scattered, on the surface or below it.
     #[inline]
     pub fn is_black(&self) -> bool {
-        matches!(self, Self::Black)
+        self.is_black_surface() && self.body.is_none()
+    }
+
+    /// Whether the surface scatters nothing.
+    #[inline]
+    pub fn is_black_surface(&self) -> bool {
+        self.spread.is_empty() && self.deltas.is_empty()
     }
 
     /// Share of delta lobes among all, by number: the probability with which to take a delta lobe. At 1, light
     /// samples are pointless.
     #[inline]
     pub fn delta_share(&self) -> f32 {
-        match self {
-            Self::Specular(_) => 1.0,
-            Self::Subsurface(body) => body.surface.delta_share(),
-            Self::Lobes(lobes) => lobes.delta_share(),
-            _ => 0.0,
-        }
+        let count = self.spread.len() + self.deltas.len();
+        self.deltas.len() as f32 / count.max(1) as f32
     }
 
-    /// Whether light may pass to the other side.
+    /// Whether light may pass to the other side. That light enters a body does not count.
     #[inline]
     pub fn transmits(&self) -> bool {
-        match self {
-            Self::RoughGlass(_, transmission) => transmission.is_some(),
-            Self::Specular(specular) => specular.transmits(),
-            Self::Lobes(lobes) => lobes.transmits(),
-            _ => false,
-        }
+        let passes = |lobe: &Lobe| lobe.is_of(false);
+        self.body.is_none()
+            && (self.spread.iter().any(passes) || self.deltas.iter().any(Specular::transmits))
     }
 
     /// Whether the value depends on the tangent as well as on the normal.
     #[inline]
     pub fn is_anisotropic(&self) -> bool {
-        match self {
-            Self::Glossy(coat) | Self::Plastic(_, coat) => coat.is_anisotropic(),
-            Self::RoughGlass(Some(reflection), _) => reflection.is_anisotropic(),
-            Self::RoughGlass(None, Some(transmission)) => transmission.is_anisotropic(),
-            Self::Subsurface(body) => body.surface.is_anisotropic(),
-            Self::Lobes(lobes) => lobes.is_anisotropic(),
-            _ => false,
-        }
+        self.spread.iter().any(|lobe| lobe.is_anisotropic())
     }
 
     /// Index of refraction inside over outside of the lobe that spreads light to the other side. 1 without one.
     pub fn eta(&self) -> f32 {
-        match self {
-            Self::RoughGlass(_, Some(transmission)) => transmission.eta(),
-            Self::Lobes(lobes) => lobes.eta(),
-            _ => 1.0,
-        }
+        let indices = self.spread.iter().map(|lobe| lobe.eta());
+        { indices }.find(|eta| *eta != 1.0).unwrap_or(1.0)
     }
 
     /// Value and density for unit directions `wo` (towards the viewer) and `wi` (towards the light).
@@ -235,90 +186,45 @@ impl Bsdf {
     /// `reflects` says whether both lie on the same side of the geometric surface. Delta lobes are 0.
     #[inline]
     pub fn evaluate(&self, wo: Vec3, wi: Vec3, reflects: bool) -> Evaluation {
+        let mut sum = Evaluation::default();
         if wo.z == 0.0 {
-            return Evaluation::default();
+            return sum;
         }
-        let reflected = |value: Vec3| if reflects { value } else { Vec3::ZERO };
-        match self {
-            Self::Black | Self::Specular(_) => Evaluation::default(),
-            Self::Diffuse(base) => Evaluation {
-                value: reflected(base.value(wo, wi)),
-                pdf: base.pdf(wo, wi),
-            },
-            Self::Glossy(coat) => Evaluation {
-                value: reflected(coat.value(wo, wi)),
-                pdf: coat.pdf(wo, wi),
-            },
-            Self::Metallic(lobe) => Evaluation {
-                value: reflected(lobe.value(wo, wi)),
-                pdf: lobe.pdf(wo, wi),
-            },
-            Self::Plastic(base, coat) => Evaluation {
-                value: reflected(base.value(wo, wi) + coat.value(wo, wi)),
-                pdf: 0.5 * (base.pdf(wo, wi) + coat.pdf(wo, wi)),
-            },
-            Self::RoughGlass(reflection, transmission) => {
-                let mut lobes = 0.0;
-                let mut sum = Evaluation::default();
-                if let Some(lobe) = reflection {
-                    lobes += 1.0;
-                    sum.value += reflected(lobe.value(wo, wi));
-                    sum.pdf += lobe.pdf(wo, wi);
-                }
-                if let Some(lobe) = transmission {
-                    lobes += 1.0;
-                    if !reflects {
-                        sum.value += lobe.value(wo, wi);
-                    }
-                    sum.pdf += lobe.pdf(wo, wi);
-                }
-                sum.pdf /= lobes;
-                sum
+        for lobe in &self.spread {
+            let one = lobe.evaluate(wo, wi);
+            sum.pdf += one.pdf;
+            if lobe.is_of(reflects) {
+                sum.value += one.value;
             }
-            Self::Subsurface(body) => body.surface.evaluate(wo, wi, reflects),
-            Self::Lobes(lobes) => lobes.evaluate(wo, wi, reflects),
         }
+        sum.pdf /= self.spread.len().max(1) as f32;
+        sum
     }
 
     /// Direction drawn with the density that [`Bsdf::evaluate`] reports. Delta lobes are never drawn.
     ///
     /// `None` if the draw fails (a facet facing away, total reflection) and the path ends.
     pub fn sample(&self, wo: Vec3, lobe: f32, u: [f32; 2]) -> Option<Vec3> {
-        if wo.z == 0.0 {
+        if wo.z == 0.0 || self.spread.is_empty() {
             return None;
         }
-        match self {
-            Self::Black | Self::Specular(_) => None,
-            Self::Diffuse(_) => Some(cosine_side(wo, u)),
-            Self::Glossy(coat) => coat.sample(wo, u),
-            Self::Metallic(metallic) => metallic.sample(wo, lobe, u),
-            Self::Plastic(_, coat) => {
-                if lobe < 0.5 {
-                    Some(cosine_side(wo, u))
-                } else {
-                    coat.sample(wo, u)
-                }
-            }
-            Self::RoughGlass(reflection, transmission) => match (reflection, transmission) {
-                (Some(reflection), Some(_)) if lobe < 0.5 => reflection.sample(wo, u),
-                (_, Some(transmission)) => transmission.sample(wo, u),
-                (Some(reflection), None) => reflection.sample(wo, u),
-                (None, None) => None,
-            },
-            Self::Subsurface(body) => body.surface.sample(wo, lobe, u),
-            Self::Lobes(lobes) => lobes.sample(wo, lobe, u),
-        }
+        let (index, rest) = choose(lobe, self.spread.len());
+        self.spread[index].sample(wo, rest, u)
     }
 
     /// Delta lobe by `choice` in `[0, 1)`, its weight divided by the probability of the choice. `None` where there is
     /// none, or where it leads nowhere.
     pub fn sample_delta(&self, wo: Vec3, choice: f32) -> Option<SpecularSample> {
-        match self {
-            Self::Specular(specular) => specular.sample(wo, choice),
-            Self::Subsurface(body) => body.surface.sample_delta(wo, choice),
-            Self::Lobes(lobes) => lobes.sample_delta(wo, choice),
-            _ => None,
+        let count = self.deltas.len();
+        if count == 0 {
+            return None;
         }
+        let (index, rest) = choose(choice, count);
+        let sample = self.deltas[index].sample(wo, rest)?;
+        Some(SpecularSample {
+            weight: sample.weight * count as f32,
+            ..sample
+        })
     }
 
     /// Share of light from all around that leaves towards `wo`, estimated by few directions that are always the same.
@@ -351,21 +257,26 @@ impl Bsdf {
 
     /// Sum of the reflecting delta lobes, which share one direction.
     pub fn delta_reflection(&self, wo: Vec3) -> Option<SpecularSample> {
-        match self {
-            Self::Specular(specular) => specular.reflection(wo),
-            Self::Subsurface(body) => body.surface.delta_reflection(wo),
-            Self::Lobes(lobes) => lobes.delta_reflection(wo),
-            _ => None,
-        }
+        let reflections = self.deltas.iter().filter_map(|lobe| lobe.reflection(wo));
+        reflections.reduce(|sum, one| SpecularSample {
+            weight: sum.weight + one.weight,
+            ..sum
+        })
     }
 
-    /// Transmitting delta lobe by `choice` in `[0, 1)`, its weight divided by the probability of the choice.
+    /// Transmitting delta lobe by `choice` in `[0, 1)`, its weight divided by the probability of the choice. `None` above a body.
     pub fn delta_transmission(&self, wo: Vec3, choice: f32) -> Option<SpecularSample> {
-        match self {
-            Self::Specular(specular) => specular.transmission(wo),
-            Self::Lobes(lobes) => lobes.delta_transmission(wo, choice),
-            _ => None,
+        let transmitting = || self.deltas.iter().filter(|lobe| lobe.transmits());
+        let count = transmitting().count();
+        if count == 0 || self.body.is_some() {
+            return None;
         }
+        let (index, _) = choose(choice, count);
+        let sample = transmitting().nth(index)?.transmission(wo)?;
+        Some(SpecularSample {
+            weight: sample.weight * count as f32,
+            ..sample
+        })
     }
 }
 

@@ -1,4 +1,4 @@
-//! Bodies below a dielectric interface in which light wanders: a surface that reflects, and what is inside.
+//! Bodies below a dielectric interface in which light wanders: the interface, and what is inside.
 //!
 //! Light enters by refraction, is scattered as in a homogeneous medium, is reflected at the interface from inside by
 //! Fresnel's formulas, and leaves with the separable angular profile of pbrt-v3, `S_w`. So the walk takes the place of
@@ -9,7 +9,6 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::Bsdf;
 use super::fresnel::dielectric;
 use crate::medium::Coefficients;
 use crate::surface::refract;
@@ -20,8 +19,6 @@ const INTERVALS: u32 = 64;
 /// A body that scatters light below its surface.
 #[derive(Clone, Debug)]
 pub struct Subsurface {
-    /// Reflection at the surface, without transmission.
-    pub surface: Bsdf,
     /// Scale of the light that enters.
     pub kt: Vec3,
     /// Interface between outside and inside.
@@ -34,9 +31,11 @@ pub struct Subsurface {
 
 impl Subsurface {
     /// Probability with which light that is seen at this cosine to the normal comes from inside.
-    pub fn chance_to_enter(&self, cos: f32) -> f32 {
+    ///
+    /// `reflects` says whether the surface scatters anything.
+    pub fn chance_to_enter(&self, cos: f32, reflects: bool) -> f32 {
         let entering = (1.0 - self.interface.reflectance(cos)) * self.kt.max_element();
-        if self.surface.is_black() {
+        if !reflects {
             1.0
         } else if entering <= 0.0 {
             0.0

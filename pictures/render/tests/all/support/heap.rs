@@ -1,5 +1,8 @@
 //! A scene with a little of everything, for tests that hold for any scene.
 
+use antumbra_scene::material::{
+    Bumped, Glass, Matte, Metal, Mirror, Mix, Plastic, Substrate, Translucent, Uber,
+};
 use std::sync::Arc;
 
 use antumbra_render::Options;
@@ -33,26 +36,26 @@ pub fn heap(seed: u64) -> Scene {
     let mut scene = empty();
     scene.camera = look(Vec3::new(0.0, 0.0, -6.0), Vec3::ZERO, 35.0);
     scene.film.resolution = [40, 27];
-    let plastic = Material::Plastic {
+    let plastic = Material::Plastic(Plastic {
         kd: Rgb::splat(0.3).into(),
         ks: Rgb::splat(0.3).into(),
         roughness: 0.1.into(),
         remap_roughness: true,
-    };
-    let rough = Material::Glass {
+    });
+    let rough = Material::Glass(Glass {
         kr: Rgb::ONE.into(),
         kt: Rgb::splat(0.9).into(),
         eta: 1.5.into(),
         roughness: [0.2, 0.1].map(Param::Constant),
         remap_roughness: false,
-    };
-    let mirror = Material::Mirror {
+    });
+    let mirror = Material::Mirror(Mirror {
         kr: Rgb::splat(0.9).into(),
-    };
-    let oren_nayar = Material::Matte {
+    });
+    let oren_nayar = Material::Matte(Matte {
         kd: Rgb::new(0.2, 0.5, 0.8).into(),
         sigma: 20.0.into(),
-    };
+    });
     let mut materials = vec![matte(0.6), oren_nayar, plastic, rough, mirror, glass(1.3)];
     materials.extend(layered());
     for material in materials {
@@ -67,7 +70,7 @@ pub fn heap(seed: u64) -> Scene {
             mesh.indices
                 .push([0, 1, 2].map(|corner| 3 * triangle + corner));
         }
-        if matches!(material, Material::Plastic { .. } | Material::Mirror { .. }) {
+        if matches!(material, Material::Plastic(_) | Material::Mirror(_)) {
             mesh.normals.clear();
         }
         add(&mut scene, Geometry::Mesh(Arc::new(mesh)), material);
@@ -95,13 +98,13 @@ pub fn heap(seed: u64) -> Scene {
 fn layered() -> [Material; 5] {
     let grey = |value: f32| Param::Constant(Rgb::splat(value));
     let roughness = [0.1, 0.3].map(Param::Constant);
-    let metal = Material::Metal {
+    let metal = Material::Metal(Metal {
         eta: Rgb::new(0.2, 0.9, 1.1).into(),
         k: Rgb::new(3.9, 2.5, 2.1).into(),
         roughness: roughness.clone(),
         remap_roughness: true,
-    };
-    let uber = Material::Uber {
+    });
+    let uber = Material::Uber(Uber {
         kd: grey(0.3),
         ks: grey(0.2),
         kr: grey(0.2),
@@ -110,33 +113,33 @@ fn layered() -> [Material; 5] {
         opacity: grey(0.6),
         eta: 1.4.into(),
         remap_roughness: true,
-    };
-    let substrate = Material::Substrate {
+    });
+    let substrate = Material::Substrate(Substrate {
         kd: grey(0.4),
         ks: grey(0.3),
         roughness,
         remap_roughness: true,
-    };
-    let translucent = Material::Translucent {
+    });
+    let translucent = Material::Translucent(Translucent {
         kd: grey(0.4),
         ks: grey(0.3),
         reflect: grey(0.5),
         transmit: grey(0.5),
         roughness: 0.2.into(),
         remap_roughness: true,
-    };
-    let mixed = Material::Mix {
+    });
+    let mixed = Material::Mix(Mix {
         materials: [metal, translucent].map(Arc::new),
         amount: grey(0.3),
-    };
+    });
     // `materials.rs` tests other textures.
-    let bumped = Material::Bumped {
+    let bumped = Material::Bumped(Bumped {
         material: Arc::new(substrate.clone()),
         height: Param::Texture(Arc::new(Texture::Bilerp {
             corners: [0.0, 0.1, 0.0, 0.3],
             mapping: Mapping::default(),
         })),
-    };
+    });
     [uber, substrate, mixed, bumped, Material::None]
 }
 

@@ -2,6 +2,7 @@
 
 pub mod heap;
 
+use antumbra_scene::material::{Glass, Matte};
 use std::sync::Arc;
 
 use antumbra_render::{Options, Rendering, World, render};
@@ -128,21 +129,21 @@ pub fn floor(height: f32) -> Geometry {
 
 /// A Lambertian material.
 pub fn matte(reflectance: f32) -> Material {
-    Material::Matte {
+    Material::Matte(Matte {
         kd: Rgb::splat(reflectance).into(),
         sigma: 0.0.into(),
-    }
+    })
 }
 
 /// Smooth glass that loses nothing.
 pub fn glass(eta: f32) -> Material {
-    Material::Glass {
+    Material::Glass(Glass {
         kr: Rgb::ONE.into(),
         kt: Rgb::ONE.into(),
         eta: eta.into(),
         roughness: [0.0, 0.0].map(Param::Constant),
         remap_roughness: true,
-    }
+    })
 }
 
 /// A one-sided area light.

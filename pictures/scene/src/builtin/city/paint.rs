@@ -1,5 +1,6 @@
 //! Materials of the city.
 
+use crate::material::{Matte, Plastic};
 use crate::{Material, Rgb};
 
 /// Material by its use. Each is one mesh of the scene.
@@ -76,17 +77,17 @@ impl Paint {
 }
 
 fn matte(r: f32, g: f32, b: f32) -> Material {
-    Material::Matte {
+    Material::Matte(Matte {
         kd: Rgb::new(r, g, b).into(),
         sigma: 0.0.into(),
-    }
+    })
 }
 
 fn plastic(kd: [f32; 3], ks: f32, roughness: f32) -> Material {
-    Material::Plastic {
+    Material::Plastic(Plastic {
         kd: Rgb::from(kd).into(),
         ks: Rgb::splat(ks).into(),
         roughness: roughness.into(),
         remap_roughness: true,
-    }
+    })
 }
