@@ -2,45 +2,22 @@
 //!
 //! A door: arguments become what the kernel and its companions take, and answers become arrays. Nothing is decided here.
 //!
-//! - `arrays`: arguments that are arrays;  `broadcast`: their leading shapes
-//! - `meshes`: meshes of a call;  `curves`: curves;  `placements`: instances
-//! - `geometry`: what scenes are made of;  `scene`: the same with a tree
-//! - `methods`: the class `Queries`, in several files;  `scenes`: the class `Scene`;  `world`: the class `World`
-//! - `rays`: rays of a call, in pieces;  `groups`: rays from every point in every direction
-//! - `queries`: what rays hit;  `hits`: the results;  `points`: questions about points
-//! - `distinct`: hits as trimesh returns them;  `memory`: lists that may not fit
-//! - `bake`: ambient occlusion, sky, sun, visibility between points;  `bits`: the class `BitMatrix`;  `picture`: the class `Picture`;  `map`: the
-//!   class `Map`
-//! - `html`: what notebooks show
-//! - `file`: scenes from files;  `saved`: scenes in files and pickles
-//! - `threads`: pools of threads, and `fork`;  `watch`: Ctrl-C and progress
+//! - `arrays`: arguments that are arrays;  `call`: threads, Ctrl-C and progress;  `errors`: exceptions
+//! - `scene`: a tree with everything that made it
+//! - `rays`: rays and what they hit;  `points`: questions about points;  `bakes`: jobs about many points
+//! - `methods`: the classes `Queries`, `Scene` and `World`
+//! - `pictures`: the classes `Picture` and `Map`;  `html`: what notebooks show
 
 mod arrays;
-mod bake;
-mod bits;
-mod broadcast;
-mod curves;
-mod distinct;
-mod file;
-mod geometry;
-mod groups;
-mod hits;
+mod bakes;
+mod call;
+mod errors;
 mod html;
-mod map;
-mod memory;
-mod meshes;
 mod methods;
-mod picture;
-mod placements;
+mod pictures;
 mod points;
-mod queries;
 mod rays;
-mod saved;
 mod scene;
-mod scenes;
-mod threads;
-mod watch;
-mod world;
 
 use pyo3::create_exception;
 use pyo3::exceptions::PyUserWarning;
@@ -58,25 +35,25 @@ mod _core {
     #[pymodule_export]
     use super::DegenerateWarning;
     #[pymodule_export]
-    use super::bake::{sky_patches, sun_positions, texel_atlas};
+    use super::bakes::bits::BitMatrix;
     #[pymodule_export]
-    use super::bits::BitMatrix;
+    use super::bakes::{sensors::texel_atlas, sky::sky_patches, sun::sun_positions};
     #[pymodule_export]
-    use super::hits::{HitList, Hits};
-    #[pymodule_export]
-    use super::map::Map;
+    use super::call::threads::{get_threads, set_threads};
     #[pymodule_export]
     use super::methods::Queries;
     #[pymodule_export]
-    use super::picture::{Picture, heat_map, render};
+    use super::methods::scene::Scene;
+    #[pymodule_export]
+    use super::methods::world::{ChildOrder, World};
+    #[pymodule_export]
+    use super::pictures::map::Map;
+    #[pymodule_export]
+    use super::pictures::picture::{Picture, heat_map, render};
     #[pymodule_export]
     use super::points::Closest;
     #[pymodule_export]
-    use super::scenes::Scene;
-    #[pymodule_export]
-    use super::threads::{get_threads, set_threads};
-    #[pymodule_export]
-    use super::world::{ChildOrder, World};
+    use super::rays::hits::{HitList, Hits};
     #[pymodule_export]
     #[allow(non_upper_case_globals)]
     const __version__: &str = env!("CARGO_PKG_VERSION");

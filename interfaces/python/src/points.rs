@@ -3,52 +3,36 @@
 use std::sync::Arc;
 
 use antumbra::inputs::Distance;
-use antumbra::{ClosestPoint, Ray};
+use antumbra::{Bvh, ClosestPoint, Ray};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{Numbers, shape_text, wrong_shape};
-use crate::broadcast::{Index, Operand, common_shape};
-use crate::hits::{Columns, Hits, Row, Source, State};
-use crate::memory;
-use crate::rays::Call;
+use crate::arrays::broadcast::{Index, Operand, common_shape};
+use crate::arrays::{Numbers, memory, shape_text, wrong_shape};
+use crate::call::Call;
+use crate::rays::hits::{Columns, Hits, Row, Source, State};
 use crate::scene::SceneData;
 
 /// Points of one thread between two looks for signals.
 const PIECE: usize = 1 << 14;
 
-pub fn contains(
-    py: Python<'_>,
+/// Answers of `query` about all points, some at a time.
+pub fn asked<A: Clone + Send>(
+    call: &mut Call<'_>,
     scene: &SceneData,
     points: &Numbers<'_>,
-    call: &mut Call<'_>,
-) -> PyResult<Vec<bool>> {
+    (nothing, what): (A, &str),
+    query: impl Fn(&Bvh, &[[f32; 3]], &mut [A]) + Sync + Send,
+) -> PyResult<Vec<A>> {
     let points = scene.local_points(points)?;
-    let mut inside = memory::filled(false, points.len(), "answers")?;
-    call.in_pieces(py, points.len(), PIECE, |range, threads| {
-        let (points, inside) = (&points[range.clone()], &mut inside[range]);
-        py.detach(|| threads.run(|| scene.bvh().points(points).inside_into(inside)));
+    let mut answers = memory::filled(nothing, points.len(), what)?;
+    call.in_pieces(points.len(), PIECE, |range, threads| {
+        let (points, answers) = (&points[range.clone()], &mut answers[range]);
+        threads.run(|| query(scene.bvh(), points, answers));
         Ok(())
     })?;
-    Ok(inside)
-}
-
-/// Distances to the nearest surface, negative inside.
-pub fn signed_distances(
-    py: Python<'_>,
-    scene: &SceneData,
-    points: &Numbers<'_>,
-    call: &mut Call<'_>,
-) -> PyResult<Vec<f32>> {
-    let points = scene.local_points(points)?;
-    let mut distances = memory::filled(f32::INFINITY, points.len(), "distances")?;
-    call.in_pieces(py, points.len(), PIECE, |range, threads| {
-        let (points, distances) = (&points[range.clone()], &mut distances[range]);
-        py.detach(|| threads.run(|| scene.bvh().points(points).signed_distances_into(distances)));
-        Ok(())
-    })?;
-    Ok(distances)
+    Ok(answers)
 }
 
 /// How far from each point a surface may be: one number for all points, or one for each.
@@ -165,25 +149,25 @@ impl Closest {
 }
 
 pub fn closest<'py>(
-    py: Python<'py>,
+    call: &mut Call<'py>,
     scene: &Arc<SceneData>,
     numbers: &Numbers<'_>,
     max_distance: Option<&Bound<'py, PyAny>>,
-    call: &mut Call<'_>,
 ) -> PyResult<Bound<'py, Closest>> {
     let limits = limits(numbers, max_distance)?;
     let points = scene.local_points(numbers)?;
     let mut found: Vec<Option<ClosestPoint>> = memory::filled(None, points.len(), "answers")?;
-    call.in_pieces(py, points.len(), PIECE, |range, threads| {
+    call.in_pieces(points.len(), PIECE, |range, threads| {
         let (points, found) = (&points[range.clone()], &mut found[range.clone()]);
-        let bvh = scene.bvh();
         let limit = match &limits[..] {
             [one] => Distance::Same(*one),
             each => Distance::from(&each[range]),
         };
-        py.detach(|| threads.run(|| bvh.points(points).within(limit).closest_into(found)));
+        let points = scene.bvh().points(points).within(limit);
+        threads.run(|| points.closest_into(found));
         Ok(())
     })?;
+    let py = call.py;
     let mut columns = Columns::missed(points.len())?;
     let rows = columns.rows(0..points.len());
     rows.fill(&found, |near| Row::of_point(scene, near));

@@ -1,15 +1,21 @@
 //! Jobs about many points: visibility, open sky, sun.
 
-use antumbra_bake::{AmbientOcclusion, Place, Sunlight};
+use antumbra_bake::{AmbientOcclusion, Place, SunJob, Sunlight};
 use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
 use super::Queries;
-use crate::bake;
-use crate::bake::Places;
-use crate::bits::BitMatrix;
-use crate::rays::Call;
-use crate::threads::ThreadCount;
+use crate::arrays::{Numbers, memory};
+use crate::bakes::bits::BitMatrix;
+use crate::bakes::sky::{orientation, sky, weighting};
+use crate::bakes::sun::{directions, suns, time_steps};
+use crate::bakes::{Job, sensors};
+use crate::call::Call;
+use crate::call::threads::ThreadCount;
+use crate::errors::failed;
+
+/// Irradiation by the sun and by the sky.
+type Irradiation<'py> = (Bound<'py, PyArrayDyn<f64>>, Bound<'py, PyArrayDyn<f64>>);
 
 #[pymethods]
 #[allow(clippy::too_many_arguments)]
@@ -63,8 +69,26 @@ impl Queries {
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<BitMatrix> {
         let data = self.data();
-        let mut call = Call::new(threads, progress)?;
-        bake::visibility(py, &data, a, b, margin, &mut call)
+        let mut call = Call::new(py, threads, progress)?;
+        let points = |object: &Bound<'_, PyAny>, name| {
+            let numbers = Numbers::read(object, name, 3)?;
+            numbers.rows()?;
+            data.local_points(&numbers)
+        };
+        let from = points(a, "a")?;
+        let seen = match b {
+            Some(b) => {
+                let to = points(b, "b")?;
+                call.watch(|signals| {
+                    antumbra_bake::sees_points(data.bvh(), &from, &to, margin, signals)
+                })
+            }
+            None => call.watch(|signals| {
+                let all = 0..from.len();
+                antumbra_bake::sees_each_other(data.bvh(), &from, all, margin, signals)
+            }),
+        };
+        Ok(seen?.map_err(failed)?.into())
     }
 
     /// Which directions points see.
@@ -113,10 +137,13 @@ impl Queries {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<BitMatrix> {
-        let data = self.data();
-        let places = Places::read(&data, points, normals)?;
-        let mut call = Call::new(threads, progress)?;
-        bake::sees(py, &data, &places, directions, distance, &mut call)
+        let call = Call::new(py, threads, progress)?;
+        let mut job = Job::new(self.data(), points, normals, call)?;
+        let towards = self::directions(directions, "directions")?;
+        let seen = job.run(|(bvh, points, normals), signals| {
+            antumbra_bake::sees_directions(bvh, points, normals, &towards, distance, signals)
+        })?;
+        Ok(seen.into())
     }
 
     /// Open part of the sky above points of surfaces.
@@ -173,21 +200,29 @@ impl Queries {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
-        let data = self.data();
-        let places = Places::read(&data, points, Some(normals))?;
+        let call = Call::new(py, threads, progress)?;
+        let mut job = Job::new(self.data(), points, Some(normals), call)?;
         let options = AmbientOcclusion {
             samples,
             distance,
             two_sided,
-            weighting: bake::weighting(weighting)?,
+            weighting: self::weighting(weighting)?,
             seed,
         };
-        let mut call = Call::new(threads, progress)?;
-        let (open, bent) = bake::ambient_occlusion(py, &data, &places, &options, bent, &mut call)?;
-        match bent {
-            None => Ok(open.into_any()),
-            Some(bent) => Ok((open, bent).into_pyobject(py)?.into_any()),
+        if !bent {
+            let open = job.run(|(bvh, points, normals), signals| {
+                antumbra_bake::ambient_occlusion(bvh, points, normals, &options, signals)
+            })?;
+            return Ok(job.array(open, &[])?.into_any());
         }
+        let found = job.run(|(bvh, points, normals), signals| {
+            antumbra_bake::bent_normals(bvh, points, normals, &options, signals)
+        })?;
+        let open = memory::collected(found.iter().map(|point| point.open), found.len(), "values")?;
+        let bent = found.iter().flat_map(|point| point.direction);
+        let bent = memory::collected(bent, 3 * found.len(), "numbers of directions")?;
+        let both = (job.array(open, &[])?, job.array(bent, &[3])?);
+        Ok(both.into_pyobject(py)?.into_any())
     }
 
     /// Part of the sky that points see, by its patches.
@@ -238,13 +273,14 @@ impl Queries {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
-        let data = self.data();
-        let places = Places::read(&data, points, normals)?;
-        let (sky, orientation) = (bake::sky(patches, uniform)?, bake::orientation(up, north)?);
-        let weighting = bake::weighting(weighting)?;
-        let mut call = Call::new(threads, progress)?;
-        let sky = (&sky, &orientation);
-        bake::sky_view(py, &data, &places, sky, weighting, &mut call)
+        let call = Call::new(py, threads, progress)?;
+        let mut job = Job::new(self.data(), points, normals, call)?;
+        let (patches, orientation) = (sky(patches, uniform)?, orientation(up, north)?);
+        let (sky, weighting) = ((&patches, &orientation), self::weighting(weighting)?);
+        let parts = job.run(|(bvh, points, normals), signals| {
+            antumbra_bake::sky_view(bvh, points, normals, sky, weighting, signals)
+        })?;
+        job.array(parts, &[])
     }
 
     /// Hours of direct sun of points.
@@ -303,11 +339,13 @@ impl Queries {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let data = self.data();
-        let places = Places::read(&data, points, normals)?;
-        let mut call = Call::new(threads, progress)?;
-        let suns = bake::suns(suns, weights, up)?;
-        bake::sun_hours(py, &data, &places, suns, &mut call)
+        let call = Call::new(py, threads, progress)?;
+        let mut job = Job::new(self.data(), points, normals, call)?;
+        let (suns, weights) = self::suns(suns, weights, up)?;
+        let hours = job.run(|(bvh, points, normals), signals| {
+            antumbra_bake::sun_hours(bvh, points, normals, &suns, &weights, signals)
+        })?;
+        job.array(hours, &[])
     }
 
     /// Irradiation of points by the sun and by the sky: see ``antumbra.irradiation``.
@@ -323,9 +361,9 @@ impl Queries {
         sky: (u32, bool, String, f64),
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
-    ) -> PyResult<bake::Irradiation<'py>> {
-        let data = self.data();
-        let places = Places::read(&data, points, normals)?;
+    ) -> PyResult<Irradiation<'py>> {
+        let call = Call::new(py, threads, progress)?;
+        let mut job = Job::new(self.data(), points, normals, call)?;
         let (latitude, longitude, height) = place;
         let place = Place {
             latitude,
@@ -333,13 +371,19 @@ impl Queries {
             height,
         };
         let [hours, direct_normal, diffuse_horizontal] = &steps;
-        let steps = bake::time_steps(&times, hours, direct_normal, diffuse_horizontal)?;
+        let steps = time_steps(&times, hours, direct_normal, diffuse_horizontal)?;
         let (patches, uniform, up, north) = sky;
-        let (sky, orientation) = (bake::sky(patches, uniform)?, bake::orientation(&up, north)?);
-        let sunlight = Sunlight::new(&place, steps, true, sky, orientation);
-        let sunlight = sunlight.map_err(bake::failed)?;
-        let mut call = Call::new(threads, progress)?;
-        bake::irradiation(py, &data, &places, &sunlight, &mut call)
+        let (sky, orientation) = (self::sky(patches, uniform)?, orientation(&up, north)?);
+        let sunlight = Sunlight::new(&place, steps, true, sky, orientation).map_err(failed)?;
+        let found = job.run(|(bvh, points, normals), signals| {
+            let job = SunJob::new(points, normals, &sunlight)?;
+            antumbra_bake::run(&job, bvh, signals)
+        })?;
+        let values = found.values;
+        Ok((
+            job.array(values.direct, &[])?,
+            job.array(values.diffuse, &[])?,
+        ))
     }
 
     /// Points on the surfaces that are seen from above, in the middle of square cells over the bounds of the scene.
@@ -380,9 +424,7 @@ impl Queries {
         py: Python<'py>,
         spacing: f64,
         up: &str,
-    ) -> PyResult<bake::Cells<'py>> {
-        let data = self.data();
-        let orientation = bake::orientation(up, 0.0)?;
-        bake::sensor_grid(py, &data, spacing, &orientation)
+    ) -> PyResult<sensors::Cells<'py>> {
+        sensors::on_grid(py, &self.data(), spacing, &orientation(up, 0.0)?)
     }
 }

@@ -2,19 +2,20 @@
 //!
 //! - here: the class itself;  `rays`: queries about rays;  `points`: queries about points
 //! - `bakes`: jobs about many points;  `parts`: geometry, masks and files
+//! - `scene`: the class `Scene`;  `world`: the class `World`
 
 mod bakes;
 mod parts;
 mod points;
 mod rays;
+pub mod scene;
+pub mod world;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use pyo3::PyClass;
 use pyo3::prelude::*;
 
-use crate::arrays::{Numbers, wrong_shape};
-use crate::bake;
-use crate::rays::mask;
 use crate::scene::SceneData;
 
 /// Queries that scenes and worlds have in common: see ``Scene`` and ``World``.
@@ -31,15 +32,16 @@ pub struct Queries {
     data: Mutex<Arc<SceneData>>,
 }
 
-impl From<Arc<SceneData>> for Queries {
-    fn from(data: Arc<SceneData>) -> Self {
-        Self {
-            data: Mutex::new(data),
-        }
-    }
-}
-
 impl Queries {
+    /// A new object of a class that extends this one.
+    fn extended<T>(data: Arc<SceneData>, class: T) -> PyClassInitializer<T>
+    where
+        T: PyClass<BaseType = Self>,
+    {
+        let data = Mutex::new(data);
+        PyClassInitializer::from(Self { data }).add_subclass(class)
+    }
+
     /// The scene as it is now. Whoever moves it meanwhile moves a copy.
     pub fn data(&self) -> Arc<SceneData> {
         self.held().clone()
@@ -53,21 +55,4 @@ impl Queries {
     fn held(&self) -> MutexGuard<'_, Arc<SceneData>> {
         self.data.lock().unwrap_or_else(PoisonError::into_inner)
     }
-}
-
-/// Masks of an argument: one for all of `count` things, or one for each. All bits without an argument.
-pub fn read_masks(
-    object: Option<&Bound<'_, PyAny>>,
-    name: &'static str,
-    count: usize,
-) -> PyResult<Vec<u32>> {
-    let Some(object) = object else {
-        return Ok(Vec::new());
-    };
-    let numbers = Numbers::whole(object, name)?;
-    if !numbers.shape().is_empty() && numbers.shape() != [count] {
-        let wanted = format!("() or ({count},)");
-        return Err(wrong_shape(name, numbers.shape(), &wanted));
-    }
-    bake::each(&numbers, count)?.into_iter().map(mask).collect()
 }

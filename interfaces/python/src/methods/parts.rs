@@ -3,13 +3,14 @@
 use std::path::PathBuf;
 
 use antumbra_bake::vertex_normals;
-use numpy::PyArrayDyn;
+use numpy::{PyArray1, PyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use super::{Queries, read_masks};
-use crate::arrays::shaped;
-use crate::{html, memory, saved};
+use super::Queries;
+use crate::arrays::{masks, memory, shaped};
+use crate::html;
+use crate::scene::saved::{self, Reduced};
 
 #[pymethods]
 impl Queries {
@@ -200,17 +201,26 @@ impl Queries {
         py.detach(|| {
             parts.placed(|positions, indices, place| match place {
                 None => normals.extend(vertex_normals(positions, indices)),
-                Some(rows) => {
-                    let placed = positions.iter().map(|&point| {
-                        let [x, y, z] = point;
-                        rows.map(|[a, b, c, _]| a * x + b * y + c * z)
-                    });
+                Some(instance) => {
+                    let rows = instance.transform;
+                    let placed = positions
+                        .iter()
+                        .map(|&[x, y, z]| rows.map(|[a, b, c, _]| a * x + b * y + c * z));
                     let placed: Vec<_> = placed.collect();
                     normals.extend(vertex_normals(&placed, indices));
                 }
             });
         });
         shaped(py, normals.into_flattened(), &[count, 3])
+    }
+
+    /// The bytes lie in an array: protocol 5 of pickle need not copy them.
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py, (Bound<'py, PyArray1<u8>>,)> {
+        let py = slf.py();
+        let data = slf.get().data();
+        let bytes = py.detach(|| saved::to_bytes(&data))?;
+        let restore = slf.get_type().getattr("_from_bytes")?;
+        Ok((restore, (PyArray1::from_vec(py, bytes),)))
     }
 
     fn __sizeof__(&self) -> usize {
@@ -252,8 +262,8 @@ impl Queries {
     ) -> PyResult<()> {
         let data = self.data();
         let (meshes, placed) = (data.parts.parts.len(), data.parts.instances.len());
-        let masks = read_masks(masks, "masks", meshes)?;
-        let instances = read_masks(instances, "instances", placed)?;
+        let masks = self::masks(masks, "masks", meshes)?;
+        let instances = self::masks(instances, "instances", placed)?;
         drop(data);
         py.detach(|| self.change(|data| data.set_masks(masks, instances)));
         Ok(())

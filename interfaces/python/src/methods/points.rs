@@ -5,9 +5,9 @@ use pyo3::prelude::*;
 
 use super::Queries;
 use crate::arrays::{Numbers, shaped};
+use crate::call::Call;
+use crate::call::threads::ThreadCount;
 use crate::points::{self, Closest};
-use crate::rays::Call;
-use crate::threads::ThreadCount;
 
 #[pymethods]
 impl Queries {
@@ -49,10 +49,15 @@ impl Queries {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
-        let data = self.data();
         let points = Numbers::read(points, "points", 3)?;
-        let mut call = Call::new(threads, progress)?;
-        let inside = points::contains(py, &data, &points, &mut call)?;
+        let mut call = Call::new(py, threads, progress)?;
+        let inside = points::asked(
+            &mut call,
+            &self.data(),
+            &points,
+            (false, "answers"),
+            |bvh, points, inside| bvh.points(points).inside_into(inside),
+        )?;
         shaped(py, inside, points.lead(3))
     }
 
@@ -95,10 +100,9 @@ impl Queries {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, Closest>> {
-        let data = self.data();
         let points = Numbers::read(points, "points", 3)?;
-        let mut call = Call::new(threads, progress)?;
-        points::closest(py, &data, &points, max_distance, &mut call)
+        let mut call = Call::new(py, threads, progress)?;
+        points::closest(&mut call, &self.data(), &points, max_distance)
     }
 
     /// Distance of each point to the nearest surface, negative inside closed meshes.
@@ -139,10 +143,15 @@ impl Queries {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
-        let data = self.data();
         let points = Numbers::read(points, "points", 3)?;
-        let mut call = Call::new(threads, progress)?;
-        let distances = points::signed_distances(py, &data, &points, &mut call)?;
+        let mut call = Call::new(py, threads, progress)?;
+        let distances = points::asked(
+            &mut call,
+            &self.data(),
+            &points,
+            (f32::INFINITY, "distances"),
+            |bvh, points, distances| bvh.points(points).signed_distances_into(distances),
+        )?;
         shaped(py, distances, points.lead(3))
     }
 }

@@ -8,13 +8,16 @@ use numpy::PyArrayDyn;
 use pyo3::prelude::*;
 
 use super::Queries;
-use crate::arrays::{Numbers, output, shaped};
-use crate::hits::{HitList, Hits, Source};
-use crate::queries::Choice;
-use crate::rays::{Call, Conditions, RayArguments, RaySource, Segments};
+use crate::arrays::{Numbers, broadcast, memory, output, shaped};
+use crate::call::Call;
+use crate::call::threads::ThreadCount;
+use crate::errors::failed;
+use crate::rays::arguments::RayArguments;
+use crate::rays::distinct;
+use crate::rays::hits::{HitList, Hits, Source};
+use crate::rays::piece::{self, RaySource, Segments};
+use crate::rays::queries::{self, Choice};
 use crate::scene::SceneData;
-use crate::threads::ThreadCount;
-use crate::{bake, broadcast, distinct, memory, queries};
 
 #[pymethods]
 #[allow(clippy::too_many_arguments)]
@@ -75,20 +78,15 @@ impl Queries {
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<bool>>> {
         let data = self.data();
-        let arguments = RayArguments::read(
-            origins,
-            directions,
-            distance,
-            near,
-            Conditions { mask, exclude },
-        )?;
-        let mut call = Call::new(threads, progress)?;
+        let arguments =
+            RayArguments::read((origins, directions), (near, distance), (mask, exclude))?;
+        let mut call = Call::new(py, threads, progress)?;
         let rays = arguments.rays(&data)?;
         let group = rays.group(&data)?;
         let query = |batch: Batch<'_>, answers: &mut [bool]| batch.closed().occluded_into(answers);
         answered(py, out, &arguments.shape, |answers| match group {
-            Some(group) => group.occluded(py, &data, answers, &mut call),
-            None => call.ask(py, data.bvh(), &rays, answers, query),
+            Some(group) => group.occluded(&mut call, &data, answers),
+            None => piece::trace(&mut call, (data.bvh(), &rays), answers, query),
         })
     }
 
@@ -143,12 +141,12 @@ impl Queries {
         let data = self.data();
         let (a, b) = (Numbers::read(a, "a", 3)?, Numbers::read(b, "b", 3)?);
         let shape = broadcast::common_shape(&[(&a, 3), (&b, 3)])?;
-        let mut call = Call::new(threads, progress)?;
-        let lines = SightLines::new(data.bvh(), margin).map_err(bake::failed)?;
+        let mut call = Call::new(py, threads, progress)?;
+        let lines = SightLines::new(data.bvh(), margin).map_err(failed)?;
         let segments = Segments::new(&a, &b, &shape, lines, data.local());
         let query = |batch: Batch<'_>, answers: &mut [bool]| batch.occluded_into(answers);
         answered(py, out, &shape, |answers| {
-            call.ask(py, data.bvh(), &segments, answers, query)?;
+            piece::trace(&mut call, (data.bvh(), &segments), answers, query)?;
             py.detach(|| {
                 for (place, answer) in answers.iter_mut().enumerate() {
                     *answer = !*answer && segments.is_finite(place);
@@ -209,21 +207,13 @@ impl Queries {
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let data = self.data();
-        let arguments = RayArguments::read(
-            origins,
-            directions,
-            distance,
-            near,
-            Conditions { mask, exclude },
-        )?;
-        let mut call = Call::new(threads, progress)?;
+        let arguments =
+            RayArguments::read((origins, directions), (near, distance), (mask, exclude))?;
+        let mut call = Call::new(py, threads, progress)?;
         let rays = arguments.rays(&data)?;
-        let [triangle, mesh, instance] = queries::occluders(py, &data, &rays, &mut call)?;
-        let ids = (
-            shaped(py, triangle, &arguments.shape)?,
-            shaped(py, mesh, &arguments.shape)?,
-            shaped(py, instance, &arguments.shape)?,
-        );
+        let [triangle, mesh, instance] = queries::occluders(&mut call, &data, &rays)?;
+        let array = |ids| shaped(py, ids, &arguments.shape);
+        let ids = (array(triangle)?, array(mesh)?, array(instance)?);
         py.import("antumbra")?.getattr("Occluders")?.call1(ids)
     }
 
@@ -279,16 +269,11 @@ impl Queries {
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Hits> {
         let data = self.data();
-        let arguments = RayArguments::read(
-            origins,
-            directions,
-            distance,
-            near,
-            Conditions { mask, exclude },
-        )?;
-        let mut call = Call::new(threads, progress)?;
+        let arguments =
+            RayArguments::read((origins, directions), (near, distance), (mask, exclude))?;
+        let mut call = Call::new(py, threads, progress)?;
         let rays = arguments.rays(&data)?;
-        let columns = queries::first_hits(py, &data, &rays, &mut call)?;
+        let columns = queries::first_hits(&mut call, &data, &rays)?;
         Hits::new(py, columns, &arguments.shape, source(&data, &rays)?)
     }
 
@@ -349,20 +334,15 @@ impl Queries {
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, HitList>> {
         let data = self.data();
-        let arguments = RayArguments::read(
-            origins,
-            directions,
-            distance,
-            near,
-            Conditions { mask, exclude },
-        )?;
-        let mut call = Call::new(threads, progress)?;
+        let arguments =
+            RayArguments::read((origins, directions), (near, distance), (mask, exclude))?;
+        let mut call = Call::new(py, threads, progress)?;
         let rays = arguments.rays(&data)?;
         let choice = Choice {
             most: max_hits.unwrap_or(usize::MAX),
             distinct,
         };
-        let lists = queries::all_hits(py, &data, &rays, choice, &mut call)?;
+        let lists = queries::all_hits(&mut call, &data, &rays, choice)?;
         let of_hits = lists.rays().map(|ray| rays.get(ray));
         let source = Source::new(&data, of_hits, lists.columns.t.len())?;
         HitList::new(py, lists.splits, lists.columns, source)
@@ -421,21 +401,16 @@ impl Queries {
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyArrayDyn<i32>>> {
         let data = self.data();
-        let arguments = RayArguments::read(
-            origins,
-            directions,
-            distance,
-            near,
-            Conditions { mask, exclude },
-        )?;
-        let mut call = Call::new(threads, progress)?;
+        let arguments =
+            RayArguments::read((origins, directions), (near, distance), (mask, exclude))?;
+        let mut call = Call::new(py, threads, progress)?;
         let rays = arguments.rays(&data)?;
         if distinct {
             let choice = Choice {
                 most: usize::MAX,
                 distinct,
             };
-            let lists = queries::all_hits(py, &data, &rays, choice, &mut call)?;
+            let lists = queries::all_hits(&mut call, &data, &rays, choice)?;
             let counts = lists.splits.windows(2);
             let counts = counts.map(|ends| (ends[1] - ends[0]) as i32);
             let counts = memory::collected(counts, rays.len(), "counts")?;
@@ -445,7 +420,7 @@ impl Queries {
         let query = |batch: Batch<'_>, counts: &mut [u32]| {
             counts.copy_from_slice(&batch.closed().count_hits());
         };
-        call.ask(py, data.bvh(), &rays, &mut counts, query)?;
+        piece::trace(&mut call, (data.bvh(), &rays), &mut counts, query)?;
         let counts = counts.into_iter().map(|count| count as i32).collect();
         shaped(py, counts, &arguments.shape)
     }
@@ -462,10 +437,10 @@ impl Queries {
     ) -> PyResult<Bound<'py, PyArrayDyn<i64>>> {
         let data = self.data();
         let arguments =
-            RayArguments::read(origins, Some(directions), None, None, Conditions::default())?;
-        let mut call = Call::new(threads, None)?;
+            RayArguments::read((origins, Some(directions)), (None, None), (None, None))?;
+        let mut call = Call::new(py, threads, None)?;
         let rays = arguments.rays(&data)?;
-        let triangles = queries::first_triangles(py, &data, &rays, &mut call)?;
+        let triangles = queries::first_triangles(&mut call, &data, &rays)?;
         shaped(py, triangles, &arguments.shape)
     }
 
@@ -484,12 +459,12 @@ impl Queries {
     ) -> PyResult<distinct::Told<'py>> {
         let data = self.data();
         let arguments =
-            RayArguments::read(origins, Some(directions), None, None, Conditions::default())?;
+            RayArguments::read((origins, Some(directions)), (None, None), (None, None))?;
         let vertices = Numbers::read(vertices, "vertices", 3)?;
         let choices = distinct::choices(&data, &vertices, max_hits, offset)?;
-        let mut call = Call::new(threads, None)?;
+        let mut call = Call::new(py, threads, None)?;
         let rays = arguments.rays(&data)?;
-        distinct::hits(py, &data, &rays, &choices, &mut call)
+        distinct::hits(&mut call, &data, &rays, &choices)
     }
 }
 

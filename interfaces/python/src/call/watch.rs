@@ -8,7 +8,7 @@ use std::time::Duration;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 
-use crate::threads::Threads;
+use super::threads::Threads;
 
 /// Time between two checks for Python's signals, and between two reports of progress.
 const TICK: Duration = Duration::from_millis(100);

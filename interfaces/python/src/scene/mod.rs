@@ -1,17 +1,28 @@
 //! What a scene holds: a tree with everything that made it.
+//!
+//! - here: the tree and its build;  `parts`: what it is made of
+//! - `meshes`: meshes of a call;  `curves`: curves;  `placements`: instances
+//! - `file`: scenes from files;  `saved`: scenes in files and pickles
+
+pub mod curves;
+pub mod file;
+pub mod meshes;
+pub mod parts;
+pub mod placements;
+pub mod saved;
 
 use std::sync::Arc;
 
-use antumbra::{Build, BuildReport, Bvh, LocalOrigin, Ray, Recipe, World};
-use pyo3::exceptions::{PyIndexError, PyMemoryError, PyOSError, PyValueError};
+use antumbra::{Build, BuildMonitor, Bvh, LocalOrigin, Object, PrimId, Ray, Recipe, World};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::DegenerateWarning;
-use crate::arrays::Numbers;
-use crate::geometry::Parts;
-use crate::memory;
-use crate::rays::Call;
-use crate::watch::watch;
+use crate::arrays::broadcast::Operand;
+use crate::arrays::{Numbers, memory};
+use crate::call::Call;
+use crate::errors::raised;
+use parts::{Ids, Parts};
 
 /// What a scene or a world holds, as it was when a call began.
 #[derive(Clone)]
@@ -136,59 +147,86 @@ impl SceneData {
         self.parts.local
     }
 
+    /// The ids that users see of what the kernel names; the id of what is not there is -1.
+    #[inline(always)]
+    pub fn ids(&self, named: impl Into<PrimId>) -> Ids {
+        let named = named.into();
+        let mesh = match self.is_plain {
+            true => named.geom_id,
+            false => self.parts.part_of(named.geom_id, named.inst_id),
+        };
+        Ids {
+            triangle: named.prim_id as i32,
+            mesh: mesh as i32,
+            instance: named.inst_id as i32,
+        }
+    }
+
     /// Points of an argument of shape (n, 3) as the tree has them.
     pub fn local_points(&self, numbers: &Numbers<'_>) -> PyResult<Vec<[f32; 3]>> {
         let count = numbers.lead(3).iter().product();
-        let operand = crate::broadcast::Operand::new(numbers, 3, numbers.lead(3));
+        let operand = Operand::new(numbers, 3, numbers.lead(3));
         let local = self.local();
         let points = (0..count).map(|place| local.local(operand.vector(place)));
         memory::collected(points, count, "points")
     }
 }
 
-/// Exception for an error of the kernel.
-pub fn raised(error: antumbra::Error) -> PyErr {
-    match error {
-        antumbra::Error::IndexOutOfRange { .. } | antumbra::Error::ObjectOutOfRange { .. } => {
-            PyIndexError::new_err(error.to_string())
-        }
-        antumbra::Error::Io { .. } => PyOSError::new_err(error.to_string()),
-        antumbra::Error::OutOfMemory { .. } => PyMemoryError::new_err(error.to_string()),
-        _ => PyValueError::new_err(error.to_string()),
-    }
+/// What the tree of a build is for.
+pub enum Use<'a> {
+    /// Meshes that stay, seen by such rays as these.
+    Fixed(&'a [Ray]),
+    /// Objects whose instances move.
+    Moving,
 }
 
-/// Builds the tree of a scene.
+/// Builds the tree of a scene or a world.
 pub fn build(
-    py: Python<'_>,
-    parts: Parts,
-    rays: &[Ray],
-    quality: Quality,
     call: &mut Call<'_>,
+    parts: Parts,
+    quality: Quality,
+    purpose: Use<'_>,
 ) -> PyResult<Arc<SceneData>> {
-    let made = watch(py, &call.threads, &mut call.progress, |signals| {
-        let primitives = parts.primitives()?;
-        let bvh = Build::new(&primitives)
-            .rays(rays)
-            .recipe(&quality.recipe())
-            .monitor(signals)
-            .bvh()?;
-        Ok(SceneData::new(Tree::Fixed(Box::new(bvh)), parts, quality))
+    let made = call.watch(|signals| {
+        let recipe = quality.recipe();
+        let tree = match purpose {
+            Use::Fixed(rays) => {
+                let primitives = parts.primitives()?;
+                let build = Build::new(&primitives).rays(rays).recipe(&recipe);
+                Tree::Fixed(Box::new(build.monitor(signals).bvh()?))
+            }
+            Use::Moving => Tree::World(Box::new(world(&parts, &recipe, signals)?)),
+        };
+        Ok(SceneData::new(tree, parts, quality))
     })?;
-    let data = Arc::new(made.map_err(raised)?);
+    let data = made.map_err(raised)?;
     let report = data.bvh().report();
     if report.dropped > 0 {
-        warn(py, &report)?;
+        let (found, all) = (report.dropped, report.dropped + report.primitives);
+        let text = format!(
+            "{found} of {all} triangles, segments or instances can never be hit and were left out: two corners or ends coincide, a number is not finite, a segment has no radius, or a transform has no inverse"
+        );
+        let warning = call.py.get_type::<DegenerateWarning>();
+        PyErr::warn(call.py, &warning, &std::ffi::CString::new(text)?, 1)?;
     }
-    Ok(data)
+    Ok(Arc::new(data))
 }
 
-pub fn warn(py: Python<'_>, report: &BuildReport) -> PyResult<()> {
-    let found = report.dropped;
-    let all = found + report.primitives;
-    let text = format!(
-        "{found} of {all} triangles, segments or instances can never be hit and were left out: two corners or ends coincide, a number is not finite, a segment has no radius, or a transform has no inverse"
-    );
-    let text = std::ffi::CString::new(text)?;
-    PyErr::warn(py, &py.get_type::<DegenerateWarning>(), &text, 1)
+/// Builds a tree of every object, and a world of their instances.
+fn world(
+    parts: &Parts,
+    recipe: &Recipe,
+    monitor: &dyn BuildMonitor,
+) -> Result<World, antumbra::Error> {
+    let build = |list: &[u32]| {
+        let geometries = parts.geometries(list);
+        let build = Build::new(&geometries[..]).recipe(recipe);
+        build.monitor(monitor).object()
+    };
+    let objects = parts.objects.iter().map(|list| build(list));
+    let objects = objects.collect::<Result<Vec<Object>, _>>()?;
+    match parts.world.is_empty() {
+        true => World::new(&objects, &parts.instances),
+        false => World::on_ground(&build(&parts.world)?, &objects, &parts.instances),
+    }
 }

@@ -4,12 +4,9 @@ use std::sync::Arc;
 
 use antumbra::cutout::Opacity;
 use antumbra::shapes::Sphere;
-use antumbra::{
-    ClosestPoint, Geometry, Hit, INVALID_ID, Instance, LocalOrigin, Masks, PrimId, Primitives,
-};
+use antumbra::{Geometry, INVALID_ID, Instance, LocalOrigin, Masks, Primitives};
 
-use crate::curves::Segments;
-use crate::scene::SceneData;
+use super::curves::Segments;
 
 /// One mesh, or what else has an index of its own.
 #[derive(Clone)]
@@ -23,6 +20,9 @@ pub enum Part {
     Spheres(Vec<Sphere>),
     Curves(Segments),
 }
+
+/// Vertices and triangles.
+pub type Triangles<'a> = (&'a [[f32; 3]], &'a [[u32; 3]]);
 
 /// Meshes and where they are placed.
 #[derive(Clone, Default)]
@@ -62,6 +62,16 @@ impl Part {
         }
     }
 
+    /// Vertices and triangles; `None` for spheres and curves.
+    pub fn triangles(&self) -> Option<Triangles<'_>> {
+        match self {
+            Self::Mesh {
+                positions, indices, ..
+            } => Some((positions, indices)),
+            Self::Spheres(_) | Self::Curves(_) => None,
+        }
+    }
+
     /// Triangles, spheres or segments.
     pub fn len(&self) -> usize {
         match self {
@@ -90,12 +100,15 @@ impl From<&Geometry<'_>> for Part {
 
 impl Parts {
     pub fn primitives(&self) -> Result<Primitives, antumbra::Error> {
-        let list = |parts: &[u32]| -> Vec<Geometry<'_>> {
-            let parts = parts.iter().map(|&part| &self.parts[part as usize]);
-            parts.map(|part| part.geometry()).collect()
-        };
-        let objects: Vec<_> = self.objects.iter().map(|object| list(object)).collect();
-        Primitives::with_instances(&list(&self.world), &objects, &self.instances)
+        let objects = self.objects.iter().map(|object| self.geometries(object));
+        let objects: Vec<_> = objects.collect();
+        Primitives::with_instances(&self.geometries(&self.world), &objects, &self.instances)
+    }
+
+    /// Some parts as the kernel takes them.
+    pub fn geometries(&self, list: &[u32]) -> Vec<Geometry<'_>> {
+        let list = list.iter().map(|&part| &self.parts[part as usize]);
+        list.map(|part| part.geometry()).collect()
     }
 
     /// Whether a kernel's `geom_id` is the number of the mesh.
@@ -105,8 +118,7 @@ impl Parts {
 
     /// Whether there is anything but triangles.
     pub fn has_others(&self) -> bool {
-        let is_mesh = |part: &Arc<Part>| matches!(**part, Part::Mesh { .. });
-        !self.parts.iter().all(is_mesh)
+        self.parts.iter().any(|part| part.triangles().is_none())
     }
 
     pub fn has_curves(&self) -> bool {
@@ -166,16 +178,13 @@ impl Parts {
     }
 
     /// Meshes as they are placed in the world, as calls of `mesh`: their vertices before they are placed, their triangles, and
-    /// the transform. Meshes of the world come first, then the meshes of every instance. Spheres and curves have no triangles.
+    /// the instance. Meshes of the world come first, then the meshes of every instance. Spheres and curves have no triangles.
     pub fn placed<'a>(
         &'a self,
-        mut mesh: impl FnMut(&'a [[f32; 3]], &'a [[u32; 3]], Option<[[f32; 4]; 3]>),
+        mut mesh: impl FnMut(&'a [[f32; 3]], &'a [[u32; 3]], Option<&'a Instance>),
     ) {
         let mut call = |part: u32, transform| {
-            if let Part::Mesh {
-                positions, indices, ..
-            } = &*self.parts[part as usize]
-            {
+            if let Some((positions, indices)) = self.parts[part as usize].triangles() {
                 mesh(positions, indices, transform);
             }
         };
@@ -184,20 +193,14 @@ impl Parts {
         }
         for instance in &self.instances {
             for &part in &self.objects[instance.object as usize] {
-                call(part, Some(instance.transform));
+                call(part, Some(instance));
             }
         }
     }
 
     /// A point of a mesh in the world.
-    pub fn world_point(&self, point: [f32; 3], place: Option<[[f32; 4]; 3]>) -> [f64; 3] {
-        let [x, y, z] = point.map(f64::from);
-        let placed = place.map_or([x, y, z], |rows| {
-            rows.map(|row| {
-                let [a, b, c, d] = row.map(f64::from);
-                a * x + b * y + c * z + d
-            })
-        });
+    pub fn world_point(&self, point: [f32; 3], instance: Option<&Instance>) -> [f64; 3] {
+        let placed = placed(instance, point.map(f64::from));
         [0, 1, 2].map(|axis| placed[axis] + self.local.origin[axis])
     }
 
@@ -229,20 +232,16 @@ impl Parts {
 
     /// Corners of a triangle in the world, as double precision has them of what the tree has; `None` for spheres and curves.
     pub fn corners(&self, ids: Ids) -> Option<[[f64; 3]; 3]> {
-        let Part::Mesh {
-            positions, indices, ..
-        } = &**self.parts.get(usize::try_from(ids.mesh).ok()?)?
-        else {
-            return None;
-        };
+        let part = self.parts.get(usize::try_from(ids.mesh).ok()?)?;
+        let (positions, indices) = part.triangles()?;
         let corners = *indices.get(usize::try_from(ids.triangle).ok()?)?;
-        let place = match usize::try_from(ids.instance) {
-            Ok(instance) => Some(self.instances.get(instance)?.transform),
+        let instance = match usize::try_from(ids.instance) {
+            Ok(instance) => Some(self.instances.get(instance)?),
             Err(_) => None,
         };
         let mut world = [[0.0; 3]; 3];
         for (to, corner) in world.iter_mut().zip(corners) {
-            *to = self.world_point(*positions.get(corner as usize)?, place);
+            *to = self.world_point(*positions.get(corner as usize)?, instance);
         }
         Some(world)
     }
@@ -256,30 +255,24 @@ pub struct Ids {
     pub instance: i32,
 }
 
-impl Ids {
-    pub fn of_hit(scene: &SceneData, hit: &Hit) -> Self {
-        Self::new(scene, [hit.prim_id, hit.geom_id, hit.inst_id])
-    }
+/// Vector from a point to another one.
+pub fn between(from: [f64; 3], to: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|axis| to[axis] - from[axis])
+}
 
-    pub fn of_prim(scene: &SceneData, prim: &PrimId) -> Self {
-        Self::new(scene, [prim.prim_id, prim.geom_id, prim.inst_id])
-    }
+/// Cross product.
+#[inline(always)]
+pub fn cross([a, b, c]: [f64; 3], [d, e, f]: [f64; 3]) -> [f64; 3] {
+    [b * f - c * e, c * d - a * f, a * e - b * d]
+}
 
-    pub fn of_point(scene: &SceneData, near: &ClosestPoint) -> Self {
-        Self::new(scene, [near.prim_id, near.geom_id, near.inst_id])
-    }
-
-    #[inline(always)]
-    fn new(scene: &SceneData, [prim, geom, inst]: [u32; 3]) -> Self {
-        let mesh = match scene.is_plain {
-            true => geom,
-            false => scene.parts.part_of(geom, inst),
-        };
-        // The id of what is not there becomes -1.
-        Self {
-            triangle: prim as i32,
-            mesh: mesh as i32,
-            instance: inst as i32,
-        }
-    }
+/// A point of an object in the world.
+#[inline(always)]
+pub fn placed(instance: Option<&Instance>, [x, y, z]: [f64; 3]) -> [f64; 3] {
+    instance.map_or([x, y, z], |instance| {
+        instance.transform.map(|row| {
+            let [a, b, c, d] = row.map(f64::from);
+            a * x + b * y + c * z + d
+        })
+    })
 }

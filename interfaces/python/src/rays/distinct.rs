@@ -1,17 +1,18 @@
 //! Hits as trimesh returns them: in double precision, and no two of one ray at the same place.
 
-use antumbra::{Batch, Hit};
+use antumbra::Hit;
 use numpy::{PyArray1, PyArrayDyn};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::arrays::{Numbers, shaped};
-use crate::broadcast::Operand;
-use crate::geometry::Part;
-use crate::memory;
-use crate::rays::{Call, Gathering, PIECE, Piece, RayArrays, RaySource};
+use super::arguments::RayArrays;
+use super::piece::{self, RaySource};
+use crate::arrays::broadcast::Operand;
+use crate::arrays::{Numbers, memory, shaped, wrong_shape};
+use crate::call::Call;
 use crate::scene::SceneData;
+use crate::scene::parts::{between, cross};
 
 /// Rays of one thread between two looks for signals, where all hits are wanted.
 const PIECE_OF_LISTS: usize = 1 << 15;
@@ -24,7 +25,9 @@ const PARALLEL: f64 = 1e-9;
 
 /// How hits are computed, and which count as one.
 pub struct Choices<'a> {
-    /// Vertices of the one mesh, not rounded.
+    /// Triangles of the one mesh.
+    indices: &'a [[u32; 3]],
+    /// Its vertices, not rounded.
     pub vertices: Operand<'a>,
     pub max_hits: usize,
     /// Hits of a ray at most so far apart, in units of the scene, are one.
@@ -50,70 +53,38 @@ pub type Told<'py> = (
 
 /// Hits of every ray, ray by ray, the nearest first.
 pub fn hits<'py>(
-    py: Python<'py>,
+    call: &mut Call<'py>,
     scene: &SceneData,
     rays: &RayArrays<'_>,
     choices: &Choices<'_>,
-    call: &mut Call<'_>,
 ) -> PyResult<Told<'py>> {
-    let indices = match &scene.parts.parts[..] {
-        [part] => match &**part {
-            Part::Mesh { indices, .. } => Some(indices),
-            Part::Spheres(_) | Part::Curves(_) => None,
-        },
-        _ => None,
-    };
-    let indices = indices.ok_or_else(|| PyValueError::new_err("the scene has not one mesh"))?;
     let asking = Asking {
         scene,
         rays,
         choices,
-        indices,
     };
-    let mut all = Vec::new();
+    let mut all: Vec<Found> = Vec::new();
     if choices.max_hits == 1 {
-        let mut gathered = Vec::new();
-        let mut hits: Vec<Option<Hit>> = Vec::new();
-        let query =
-            |batch: Batch<'_>, hits: &mut [Option<Hit>]| batch.closed().intersect_into(hits);
-        call.in_pieces(py, rays.len(), PIECE, |range, threads| {
-            let first = range.start;
-            let piece = Piece {
-                bvh: scene.bvh(),
-                rays,
-                range,
-                threads,
-            };
-            py.detach(|| {
-                memory::refill(&mut hits, None, piece.range.len(), "hits")?;
-                piece.ask(&mut gathered, Gathering::All, &mut hits, &query)?;
-                memory::grow(&mut all, piece.range.len(), "hits")?;
-                let told = hits.iter().zip(first..);
-                all.extend(told.filter_map(|(hit, ray)| asking.found(ray, hit.as_ref()?)));
-                Ok(())
-            })
+        piece::first_hits(call, (scene.bvh(), rays), |piece, hits| {
+            memory::grow(&mut all, hits.len(), "hits")?;
+            let told = hits.iter().zip(piece.range.start..);
+            all.extend(told.filter_map(|(hit, ray)| asking.found(ray, hit.as_ref()?)));
+            Ok(())
         })?;
     } else if choices.max_hits > 1 {
-        call.in_pieces(py, rays.len(), PIECE_OF_LISTS, |range, threads| {
-            let piece = Piece {
-                bvh: scene.bvh(),
-                rays,
-                range: range.clone(),
-                threads,
-            };
-            let firsts: Vec<_> = range.clone().step_by(FEW).collect();
-            let lists = |first: usize| asking.lists(first, (first + FEW).min(range.end));
-            py.detach(|| {
-                let found: Vec<_> = piece.run(|| match piece.is_alone() {
-                    true => firsts.iter().map(|&first| lists(first)).collect(),
-                    false => firsts.par_iter().map(|&first| lists(first)).collect(),
-                });
-                memory::grow(&mut all, found.iter().map(Vec::len).sum(), "hits")?;
-                all.extend(found.into_iter().flatten());
-                Ok(())
-            })
+        piece::in_pieces(call, (scene.bvh(), rays), PIECE_OF_LISTS, |piece| {
+            let firsts: Vec<_> = piece.range.clone().step_by(FEW).collect();
+            let lists = |first: usize| asking.lists(first, (first + FEW).min(piece.range.end));
+            let found: Vec<_> = piece.run(|| match piece.is_alone() {
+                true => firsts.iter().map(|&first| lists(first)).collect(),
+                false => firsts.par_iter().map(|&first| lists(first)).collect(),
+            });
+            memory::grow(&mut all, found.iter().map(Vec::len).sum(), "hits")?;
+            all.extend(found.into_iter().flatten());
+            Ok(())
         })?;
     }
+    let py = call.py;
     let numbers = |of: fn(&Found) -> i64| {
         let numbers = memory::collected(all.iter().map(of), all.len(), "hits")?;
         Ok::<_, PyErr>(PyArray1::from_vec(py, numbers))
@@ -131,7 +102,6 @@ struct Asking<'a> {
     scene: &'a SceneData,
     rays: &'a RayArrays<'a>,
     choices: &'a Choices<'a>,
-    indices: &'a [[u32; 3]],
 }
 
 impl Asking<'_> {
@@ -166,15 +136,14 @@ impl Asking<'_> {
 
     /// A hit, where the ray as it was given intersects the plane of the triangle as it was given.
     fn found(&self, ray: usize, hit: &Hit) -> Option<Found> {
-        let corners = *self.indices.get(hit.prim_id as usize)?;
+        let corners = *self.choices.indices.get(hit.prim_id as usize)?;
         let [a, b, c] = corners.map(|corner| self.choices.vertices.vector(corner as usize));
         let (origin, direction) = self.rays.given(ray);
-        let from = |from: [f64; 3], to: [f64; 3]| [0, 1, 2].map(|axis| to[axis] - from[axis]);
-        let normal = cross(from(a, b), from(a, c));
+        let normal = cross(between(a, b), between(a, c));
         let length = dot(direction, direction).sqrt();
         let down = dot(normal, direction);
         let t = if down.abs() > PARALLEL * length * dot(normal, normal).sqrt() {
-            dot(normal, from(origin, a)) / down
+            dot(normal, between(origin, a)) / down
         } else {
             f64::from(hit.t)
         };
@@ -191,39 +160,27 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|axis| {
-        let [next, last] = [(axis + 1) % 3, (axis + 2) % 3];
-        a[next] * b[last] - a[last] * b[next]
-    })
-}
-
 /// Checks arguments about vertices and hits.
 pub fn choices<'a>(
-    scene: &SceneData,
+    scene: &'a SceneData,
     vertices: &'a Numbers<'_>,
     max_hits: usize,
     offset: f64,
 ) -> PyResult<Choices<'a>> {
     let rows = vertices.rows()?;
-    let wanted = match &scene.parts.parts[..] {
-        [part] => match &**part {
-            Part::Mesh { positions, .. } => positions.len(),
-            Part::Spheres(_) | Part::Curves(_) => 0,
-        },
-        _ => 0,
+    let one = match &scene.parts.parts[..] {
+        [part] => part.triangles(),
+        _ => None,
     };
-    if rows != wanted {
-        let wanted = format!("({wanted}, 3)");
-        return Err(crate::arrays::wrong_shape(
-            "vertices",
-            vertices.shape(),
-            &wanted,
-        ));
+    let (positions, indices) =
+        one.ok_or_else(|| PyValueError::new_err("the scene has not one mesh"))?;
+    if rows != positions.len() {
+        let wanted = format!("({}, 3)", positions.len());
+        return Err(wrong_shape("vertices", vertices.shape(), &wanted));
     }
-    let vertices = Operand::new(vertices, 3, vertices.lead(3));
     Ok(Choices {
-        vertices,
+        indices,
+        vertices: Operand::new(vertices, 3, vertices.lead(3)),
         max_hits,
         offset,
     })

@@ -3,7 +3,7 @@
 use pyo3::exceptions::{PyMemoryError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{Numbers, Values, shape_text};
+use super::{Numbers, Values, shape_text};
 
 /// Where the item of a result lies in an argument.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,11 +7,10 @@ use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PySlice, PyTuple};
 
-use crate::arrays::{Numbers, shape_text, shaped};
-use crate::bake::{each, failed};
+use crate::arrays::{Numbers, from_start, memory, shape_text, shaped, wrong_shape};
+use crate::errors::{failed, wrong};
 use crate::html::{self, percent};
-use crate::memory;
-use crate::saved::Reduced;
+use crate::scene::saved::Reduced;
 
 /// Answers of yes and no about every pair of two lists, one bit each.
 ///
@@ -126,17 +125,9 @@ impl BitMatrix {
 
     /// An index as Python has it: negative ones count from the end.
     fn index(index: isize, len: usize, what: &str) -> PyResult<usize> {
-        let from_start = if index < 0 {
-            index.saturating_add_unsigned(len)
-        } else {
-            index
-        };
-        match usize::try_from(from_start) {
-            Ok(place) if place < len => Ok(place),
-            _ => Err(PyIndexError::new_err(format!(
-                "{what} {index} of a matrix with {len} {what}s"
-            ))),
-        }
+        from_start(index, len).ok_or_else(|| {
+            PyIndexError::new_err(format!("{what} {index} of a matrix with {len} {what}s"))
+        })
     }
 }
 
@@ -147,11 +138,8 @@ impl BitMatrix {
         let words = words.as_array();
         let (rows, per_row) = words.dim();
         if per_row != columns.div_ceil(64) {
-            return Err(crate::arrays::wrong_shape(
-                "words",
-                &[rows, per_row],
-                &format!("(n, {}) for {columns} columns", columns.div_ceil(64)),
-            ));
+            let wanted = format!("(n, {}) for {columns} columns", columns.div_ceil(64));
+            return Err(wrong_shape("words", &[rows, per_row], &wanted));
         }
         let words = memory::collected(words.iter().copied(), words.len(), "words")?;
         Ok(Bits::from_words(rows, columns, words)
@@ -172,8 +160,7 @@ impl BitMatrix {
         let words = self.bits.words();
         let words = memory::collected(words.iter().copied(), words.len(), "words")?;
         let words = Array2::from_shape_vec(shape, words);
-        let words = words.map_err(|error| PyValueError::new_err(error.to_string()))?;
-        Ok(words.into_pyarray(py))
+        Ok(words.map_err(wrong)?.into_pyarray(py))
     }
 
     /// Number of ones.
@@ -250,14 +237,10 @@ impl BitMatrix {
         let columns = self.bits.columns();
         let numbers = Numbers::read(weights, "weights", 1)?;
         if numbers.shape() != [columns] {
-            let wanted = crate::arrays::shape_text(&[columns]);
-            return Err(crate::arrays::wrong_shape(
-                "weights",
-                numbers.shape(),
-                &wanted,
-            ));
+            let wanted = shape_text(&[columns]);
+            return Err(wrong_shape("weights", numbers.shape(), &wanted));
         }
-        let weights = each(&numbers, columns)?;
+        let weights = numbers.each(columns)?;
         memory::check(self.bits.rows(), size_of::<f64>(), "sums")?;
         let sums = py.detach(|| self.bits.weighted_sums(&weights));
         Ok(PyArray1::from_vec(py, sums.map_err(failed)?))

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use antumbra::{Hit, Instance, Ray};
 use pyo3::prelude::*;
 
-use crate::geometry::{Ids, Part, Parts};
-use crate::memory;
+use super::At;
+use crate::arrays::memory;
 use crate::scene::SceneData;
+use crate::scene::parts::{Ids, Parts, Triangles, between, cross, placed};
 
 /// Data from which points and normals of hits are computed.
 #[derive(Clone)]
@@ -64,29 +65,20 @@ impl Source {
 
     /// Normal of a hit of something that has no triangles.
     #[cold]
-    pub(super) fn normal_on_ray(
-        &self,
-        ids: Ids,
-        [u, v]: [f32; 2],
-        t: f32,
-        place: usize,
-    ) -> Option<[f32; 3]> {
-        let ray = self.rays.get(place)?;
-        let [geom_id, inst_id] = self.parts.kernel_ids(ids)?;
+    pub(super) fn normal_on_ray(&self, at: At) -> Option<[f32; 3]> {
+        let ray = self.rays.get(at.place)?;
+        let [geom_id, inst_id] = self.parts.kernel_ids(at.ids)?;
         let hit = Hit {
-            t,
-            u,
-            v,
-            prim_id: ids.triangle as u32,
+            t: at.t,
+            u: at.uv[0],
+            v: at.uv[1],
+            prim_id: at.ids.triangle as u32,
             geom_id,
             inst_id,
         };
         self.others.as_ref()?.bvh().normal(ray, &hit)
     }
 }
-
-/// Vertices and faces of a mesh.
-type Triangles<'a> = (&'a [[f32; 3]], &'a [[u32; 3]]);
 
 /// Meshes by their numbers, to find the corners of many hits.
 pub(super) struct Meshes<'a> {
@@ -97,12 +89,10 @@ pub(super) struct Meshes<'a> {
 
 impl<'a> Meshes<'a> {
     pub(super) fn of(parts: &'a Parts) -> Self {
-        let meshes = parts.parts.iter().map(|part| match &**part {
-            Part::Mesh {
-                positions, indices, ..
-            } => (&positions[..], &indices[..]),
-            Part::Spheres(_) | Part::Curves(_) => (&[][..], &[][..]),
-        });
+        let meshes = parts
+            .parts
+            .iter()
+            .map(|part| part.triangles().unwrap_or_default());
         Self {
             meshes: meshes.collect(),
             instances: &parts.instances,
@@ -127,20 +117,14 @@ impl<'a> Meshes<'a> {
         let [u, v] = uv.map(f64::from);
         let w = 1.0 - u - v;
         let [x, y, z] = [0, 1, 2].map(|axis| w * a[axis] + u * b[axis] + v * c[axis]);
-        let placed = match self.instances.get(ids.instance as usize) {
-            None => [x, y, z],
-            Some(instance) => instance.transform.map(|row| {
-                let [a, b, c, d] = row.map(f64::from);
-                a * x + b * y + c * z + d
-            }),
-        };
+        let placed = placed(self.instances.get(ids.instance as usize), [x, y, z]);
         Some([0, 1, 2].map(|axis| placed[axis] + self.origin[axis]))
     }
 
     #[inline(always)]
     pub(super) fn normal(&self, ids: Ids) -> Option<[f32; 3]> {
         let [a, b, c] = self.corners(ids)?;
-        let [p, q] = [b, c].map(|corner| [0, 1, 2].map(|axis| corner[axis] - a[axis]));
+        let (p, q) = (between(a, b), between(a, c));
         match self.instances.get(ids.instance as usize) {
             None => unit_normal(p, q),
             Some(instance) => {
@@ -158,8 +142,8 @@ impl<'a> Meshes<'a> {
 
 /// Normal of a triangle with these sides, of length 1; `None` if it has no area.
 #[inline(always)]
-fn unit_normal([a, b, c]: [f64; 3], [d, e, f]: [f64; 3]) -> Option<[f32; 3]> {
-    let [x, y, z] = [b * f - c * e, c * d - a * f, a * e - b * d];
+fn unit_normal(p: [f64; 3], q: [f64; 3]) -> Option<[f32; 3]> {
+    let [x, y, z] = cross(p, q);
     let squared = x * x + y * y + z * z;
     let scale = 1.0 / squared.sqrt();
     (squared > 0.0).then(|| [x, y, z].map(|x| (x * scale) as f32))

@@ -11,13 +11,13 @@ use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::arrays::{Numbers, shaped, wrong_shape};
-use crate::broadcast::Operand;
-use crate::file::{unreadable, warn};
-use crate::memory;
-use crate::rays::Call;
-use crate::threads::ThreadCount;
-use crate::watch::{Signals, watch};
+use crate::arrays::broadcast::Operand;
+use crate::arrays::{Numbers, memory, shaped, wrong_shape};
+use crate::call::Call;
+use crate::call::threads::ThreadCount;
+use crate::call::watch::Signals;
+use crate::errors::wrong;
+use crate::scene::file::{unreadable, warn};
 
 /// Name of what a picture holds, where there is no memory for it.
 const PIXELS: &str = "numbers of pixels";
@@ -111,30 +111,21 @@ impl Picture {
     /// >>> os.path.getsize(path) > 100
     /// True
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let pixels = self.pixels.bind(py);
-        let written = if let Ok(array) = pixels.extract::<PyReadonlyArray3<'_, u8>>() {
-            let (height, width) = (array.shape()[0], array.shape()[1]);
-            let rows = array.as_slice()?.as_chunks().0.to_vec();
-            let is_png = path
-                .extension()
-                .is_some_and(|name| name.eq_ignore_ascii_case("png"));
-            if !is_png {
+        let is_png = path
+            .extension()
+            .is_some_and(|name| name.eq_ignore_ascii_case("png"));
+        let written = match Drawn::read(self.pixels.bind(py))? {
+            Drawn::Bytes(_) if !is_png => {
                 let path = path.display();
-                return Err(PyValueError::new_err(format!(
-                    "{path}: pixels of uint8 are written as .png"
-                )));
+                let text = format!("{path}: pixels of uint8 are written as .png");
+                return Err(PyValueError::new_err(text));
             }
-            py.detach(|| Rgb8Image::new(width, height, rows)?.write(&path))
-        } else {
-            let array = pixels.extract::<PyReadonlyArray3<'_, f32>>()?;
-            let (height, width) = (array.shape()[0], array.shape()[1]);
-            let rows = array.as_slice()?.as_chunks().0.to_vec();
-            let window = Window::full(width, height);
-            py.detach(|| Image::new(width, height, window, rows)?.write(&path))
+            Drawn::Bytes(image) => py.detach(|| image.write(&path)),
+            Drawn::Light(image) => py.detach(|| image.write(&path)),
         };
         written.map_err(|error| match error {
             antumbra_image::Error::Write { .. } => PyOSError::new_err(error.to_string()),
-            _ => PyValueError::new_err(error.to_string()),
+            _ => wrong(error),
         })
     }
 
@@ -168,20 +159,11 @@ impl Picture {
 
     /// The picture as PNG, for notebooks: linear light as ``save`` writes it.
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let pixels = self.pixels.bind(py);
-        let made = if let Ok(array) = pixels.extract::<PyReadonlyArray3<'_, u8>>() {
-            let (height, width) = (array.shape()[0], array.shape()[1]);
-            let rows = array.as_slice()?.as_chunks().0.to_vec();
-            py.detach(|| Rgb8Image::new(width, height, rows)?.to_png())
-        } else {
-            let array = pixels.extract::<PyReadonlyArray3<'_, f32>>()?;
-            let (height, width) = (array.shape()[0], array.shape()[1]);
-            let rows = array.as_slice()?.as_chunks().0.to_vec();
-            let window = Window::full(width, height);
-            py.detach(|| Image::new(width, height, window, rows)?.to_srgb8().to_png())
+        let made = match Drawn::read(self.pixels.bind(py))? {
+            Drawn::Bytes(image) => py.detach(|| image.to_png()),
+            Drawn::Light(image) => py.detach(|| image.to_srgb8().to_png()),
         };
-        let made = made.map_err(|error| PyValueError::new_err(error.to_string()))?;
-        Ok(PyBytes::new(py, &made))
+        Ok(PyBytes::new(py, &made.map_err(wrong)?))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
@@ -192,6 +174,27 @@ impl Picture {
             "<antumbra.Picture: {} x {}, {dtype}>",
             shape.1, shape.0
         ))
+    }
+}
+
+/// A picture as it is written.
+enum Drawn {
+    Bytes(Rgb8Image),
+    Light(Image),
+}
+
+impl Drawn {
+    fn read(pixels: &Bound<'_, PyAny>) -> PyResult<Self> {
+        if let Ok(array) = pixels.extract::<PyReadonlyArray3<'_, u8>>() {
+            let rows = array.as_slice()?.as_chunks().0.to_vec();
+            let image = Rgb8Image::new(array.shape()[1], array.shape()[0], rows);
+            return image.map(Self::Bytes).map_err(wrong);
+        }
+        let array = pixels.extract::<PyReadonlyArray3<'_, f32>>()?;
+        let (height, width) = (array.shape()[0], array.shape()[1]);
+        let rows = array.as_slice()?.as_chunks().0.to_vec();
+        let image = Image::new(width, height, Window::full(width, height), rows);
+        image.map(Self::Light).map_err(wrong)
     }
 }
 
@@ -229,24 +232,16 @@ pub fn heat_map(
     high: Option<f32>,
     legend: bool,
 ) -> PyResult<Picture> {
-    let numbers = Numbers::read(values, "values", 1)?;
-    let [height, width] = numbers.shape()[..] else {
-        return Err(wrong_shape("values", numbers.shape(), "(height, width)"));
-    };
-    let operand = Operand::new(&numbers, 1, numbers.shape());
-    let count = height * width;
-    let field = (0..count).map(|place| operand.number(place) as f32);
-    let field = memory::collected(field, count, PIXELS)?;
+    let (field, height, width) = Numbers::read(values, "values", 1)?.grid(PIXELS)?;
     // The picture and a copy of it.
-    memory::check(count, 2 * size_of::<[u8; 3]>(), PIXELS)?;
-    let bad = |error: antumbra_image::Error| PyValueError::new_err(error.to_string());
-    let (min, max) = heatmap::shared_range(&[&field], Range::Max).map_err(bad)?;
+    memory::check(field.len(), 2 * size_of::<[u8; 3]>(), PIXELS)?;
+    let (min, max) = heatmap::shared_range(&[&field], Range::Max).map_err(wrong)?;
     let range = Range::Fixed {
         min: low.unwrap_or(min),
         max: high.unwrap_or(max),
     };
     let options = heatmap::Options { range, legend };
-    let drawn = heatmap::render(&field, width, height, &options).map_err(bad)?;
+    let drawn = heatmap::render(&field, width, height, &options).map_err(wrong)?;
     let shape = [drawn.height(), drawn.width(), 3];
     Ok(Picture {
         pixels: shaped(py, drawn.pixels().as_flattened().to_vec(), &shape)?
@@ -317,25 +312,23 @@ pub fn render<'py>(
     threads: Option<ThreadCount>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<Picture> {
-    let mut call = Call::new(threads, progress)?;
+    let mut call = Call::new(py, threads, progress)?;
     let options = Options {
         spp,
         seed,
         standard_error,
         ..Options::default()
     };
-    let made = watch(py, &call.threads, &mut call.progress, |signals| {
+    let made = call.watch(|signals| {
         let loaded = load(&path, &LoadOptions::default());
         let loaded = loaded.map_err(|error| unreadable(&path, &error))?;
         let (mut scene, warnings) = (loaded.scene, loaded.warnings);
         if let Some((width, height)) = size {
-            set_resolution(&mut scene, [width, height])
-                .map_err(|error| PyValueError::new_err(error.to_string()))?;
+            set_resolution(&mut scene, [width, height]).map_err(wrong)?;
         }
-        let failed = |error: antumbra_render::Error| PyValueError::new_err(error.to_string());
-        let world = World::new(&scene).map_err(failed)?;
+        let world = World::new(&scene).map_err(wrong)?;
         let rendering = antumbra_render::render(&world, &options, signals);
-        rendering.map(|done| (done, warnings)).map_err(failed)
+        rendering.map(|done| (done, warnings)).map_err(wrong)
     })?;
     let (rendering, warnings) = made?;
     warn(py, &warnings)?;

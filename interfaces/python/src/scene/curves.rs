@@ -5,9 +5,8 @@ use antumbra::shapes::{CurveBasis, Curves};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{Numbers, shape_text, wrong_shape};
-use crate::broadcast::{Operand, common_shape};
-use crate::memory;
+use crate::arrays::broadcast::{Operand, common_shape};
+use crate::arrays::{Numbers, memory, shape_text, wrong_shape};
 
 /// Farthest that a cubic curve may be from its segments, relative to its largest radius: pbrt's.
 const TOLERANCE: f32 = 0.1;

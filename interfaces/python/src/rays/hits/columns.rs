@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-use antumbra::{ClosestPoint, Hit};
+use antumbra::{ClosestPoint, Hit, PrimId};
 use pyo3::prelude::*;
 
-use crate::geometry::Ids;
-use crate::memory;
+use crate::arrays::memory;
 use crate::scene::SceneData;
+use crate::scene::parts::Ids;
 
 /// Ids and places of hits, one column for each.
 #[derive(Default)]
@@ -89,7 +89,7 @@ impl Row {
     pub fn of_hit(scene: &SceneData, hit: &Hit) -> Self {
         Self {
             t: hit.t,
-            ids: Ids::of_hit(scene, hit),
+            ids: scene.ids(hit),
             uv: [hit.u, hit.v],
         }
     }
@@ -97,7 +97,11 @@ impl Row {
     pub fn of_point(scene: &SceneData, near: &ClosestPoint) -> Self {
         Self {
             t: near.distance,
-            ids: Ids::of_point(scene, near),
+            ids: scene.ids(PrimId {
+                inst_id: near.inst_id,
+                geom_id: near.geom_id,
+                prim_id: near.prim_id,
+            }),
             uv: [near.u, near.v],
         }
     }

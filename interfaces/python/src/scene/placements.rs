@@ -4,10 +4,9 @@ use antumbra::{Instance, NestedInstances};
 use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::arrays::{Numbers, wrong_shape};
-use crate::broadcast::Operand;
-use crate::memory;
-use crate::scene::raised;
+use crate::arrays::broadcast::Operand;
+use crate::arrays::{Numbers, memory, wrong_shape};
+use crate::errors::raised;
 
 /// A placement before it is rounded: rows of a matrix.
 #[derive(Clone, Copy)]
@@ -114,21 +113,83 @@ pub fn placements(instances: &Bound<'_, PyAny>, meshes: usize) -> PyResult<Vec<P
             )));
         };
         let matrix = Numbers::read(&pair.1, "transform", 4)?;
-        if !matches!(matrix.shape(), [3 | 4, 4]) {
+        let &[count @ (3 | 4), 4] = matrix.shape() else {
             return Err(wrong_shape("transform", matrix.shape(), "(4, 4) or (3, 4)"));
-        }
+        };
         let operand = Operand::new(&matrix, 4, matrix.lead(4));
-        let row = |place| operand.row(place);
-        if matrix.shape()[0] == 4 && row(3) != [0.0, 0.0, 0.0, 1.0] {
-            return Err(PyValueError::new_err(format!(
-                "transform: the last row of instance {index} is {:?}, wanted [0, 0, 0, 1]",
-                row(3)
-            )));
-        }
         memory::grow(&mut placements, 1, "instances")?;
         placements.push(Placement {
             mesh,
-            rows: [0, 1, 2].map(row),
+            rows: affine("transform", &operand, index, 0, count)?,
+        });
+    }
+    Ok(placements)
+}
+
+/// Rows of the affine map of an instance, which begin at `first`: three, or four of which the last one says nothing.
+fn affine(
+    name: &str,
+    operand: &Operand<'_>,
+    instance: usize,
+    first: usize,
+    count: usize,
+) -> PyResult<[[f64; 4]; 3]> {
+    let row = |place| operand.row(first + place);
+    if count == 4 && row(3) != [0.0, 0.0, 0.0, 1.0] {
+        return Err(PyValueError::new_err(format!(
+            "{name}: the last row of instance {instance} is {:?}, wanted [0, 0, 0, 1]",
+            row(3)
+        )));
+    }
+    Ok([0, 1, 2].map(row))
+}
+
+/// Reads matrices, and which of `count` objects each of them places. Without objects, instances place what they placed before,
+/// or the one object.
+pub fn of_arrays(
+    (transforms, objects): (Option<&Bound<'_, PyAny>>, Option<&Bound<'_, PyAny>>),
+    count: usize,
+    before: &[u32],
+) -> PyResult<Vec<Placement>> {
+    let Some(transforms) = transforms else {
+        return match objects {
+            None => Ok(Vec::new()),
+            Some(_) => Err(PyValueError::new_err(
+                "transforms: found none beside objects, wanted shape (k, 4, 4) or (k, 3, 4)",
+            )),
+        };
+    };
+    let matrices = Numbers::read(transforms, "transforms", 4)?;
+    let (instances, rows) = match *matrices.shape() {
+        [instances, rows @ (3 | 4), 4] => (instances, rows),
+        [0, 4] => (0, 4),
+        _ => {
+            let wanted = "(k, 4, 4) or (k, 3, 4)";
+            return Err(wrong_shape("transforms", matrices.shape(), wanted));
+        }
+    };
+    let named = match objects {
+        Some(objects) => Numbers::whole(objects, "objects")?.each(instances)?,
+        None if before.len() == instances => before.iter().map(|&object| object.into()).collect(),
+        None if count == 1 || instances == 0 => memory::filled(0.0, instances, "instances")?,
+        None => {
+            return Err(PyValueError::new_err(format!(
+                "objects: found none, wanted which of {count} meshes each of {instances} instances places"
+            )));
+        }
+    };
+    // A matrix that stands for all is in memory once.
+    let operand = Operand::new(&matrices, 4, matrices.lead(4));
+    let mut placements = memory::room(instances, "instances")?;
+    for (instance, &object) in named.iter().enumerate() {
+        if !(object >= 0.0 && object < count as f64) {
+            return Err(PyIndexError::new_err(format!(
+                "objects: instance {instance} names mesh {object}, but there are {count} meshes"
+            )));
+        }
+        placements.push(Placement {
+            mesh: object as usize,
+            rows: affine("transforms", &operand, instance, instance * rows, rows)?,
         });
     }
     Ok(placements)

@@ -3,25 +3,21 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use antumbra::{Build, Geometry, LocalOrigin, Object, Recipe};
-use numpy::{PyArray1, PyArrayDyn};
+use antumbra::{Geometry, LocalOrigin, Recipe};
+use numpy::{PyArrayDyn, PyReadonlyArray1};
 use pyo3::exceptions::{PyIndexError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyType};
 
-use crate::arrays::{Numbers, shape_text, shaped, wrong_shape};
-use crate::bake;
-use crate::broadcast::Operand;
-use crate::geometry::{Part, Parts};
-use crate::memory;
-use crate::meshes;
-use crate::methods::Queries;
-use crate::placements;
-use crate::rays::{Call, Conditions, RayArguments, RaySource};
-use crate::saved::{self, Reduced};
-use crate::scene::{Quality, SceneData, Tree, raised, warn};
-use crate::threads::{ThreadCount, Threads};
-use crate::watch::watch;
+use super::Queries;
+use crate::arrays::broadcast::Operand;
+use crate::arrays::{Numbers, memory, shape_text, shaped, wrong_shape};
+use crate::call::Call;
+use crate::call::threads::{ThreadCount, Threads};
+use crate::errors::raised;
+use crate::rays::arguments::RayArguments;
+use crate::scene::parts::{Part, Parts};
+use crate::scene::{self, Quality, SceneData, Use, meshes, placements, saved};
 
 /// Order of the children of a world's tree, which ``World.relearn`` learned and ``World.adopt`` takes.
 ///
@@ -88,10 +84,7 @@ pub struct World;
 
 impl World {
     fn with(py: Python<'_>, data: Arc<SceneData>) -> PyResult<Bound<'_, Self>> {
-        Bound::new(
-            py,
-            PyClassInitializer::from(Queries::from(data)).add_subclass(Self),
-        )
+        Bound::new(py, Queries::extended(data, Self))
     }
 
     /// Changes world and meshes without the lock of the interpreter, by the threads of a call.
@@ -129,31 +122,10 @@ impl World {
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<PyClassInitializer<Self>> {
         let quality = Quality::read(quality)?;
-        let mut call = Call::new(threads, progress)?;
-        let rows = |count| rows(transforms, objects, count, &[]);
-        let (mut parts, instances) = meshes::objects(meshes, ground, rows, origin)?;
-        let made = watch(py, &call.threads, &mut call.progress, |signals| {
-            let recipe = quality.recipe();
-            let build = |list: &[u32]| {
-                let geometries: Vec<_> = geometries(&parts, list);
-                let build = Build::new(&geometries[..]).recipe(&recipe);
-                build.monitor(signals).object()
-            };
-            let objects = parts.objects.iter().map(|list| build(list));
-            let objects = objects.collect::<Result<Vec<Object>, _>>()?;
-            match parts.world.is_empty() {
-                true => antumbra::World::new(&objects, &instances),
-                false => antumbra::World::on_ground(&build(&parts.world)?, &objects, &instances),
-            }
-        })?;
-        let world = made.map_err(raised)?;
-        parts.instances = instances;
-        let data = SceneData::new(Tree::World(Box::new(world)), parts, quality);
-        let report = data.bvh().report();
-        if report.dropped > 0 {
-            warn(py, &report)?;
-        }
-        Ok(PyClassInitializer::from(Queries::from(Arc::new(data))).add_subclass(Self))
+        let mut call = Call::new(py, threads, progress)?;
+        let parts = meshes::objects(meshes, ground, (transforms, objects), origin)?;
+        let data = scene::build(&mut call, parts, quality, Use::Moving)?;
+        Ok(Queries::extended(data, Self))
     }
 
     /// Replaces the instances: some may have moved, some be new, some be gone.
@@ -193,12 +165,13 @@ impl World {
         let data = slf.as_super().get().data();
         let parts = &data.parts;
         let before: Vec<_> = parts.instances.iter().map(|placed| placed.object).collect();
-        let rows = rows(Some(transforms), objects, parts.objects.len(), &before)?;
-        let instances = rows.iter().map(|(object, rows)| {
-            let own = parts.origins[*object];
-            placements::placed(*object as u32, rows, own, parts.local.origin)
+        let rows = (Some(transforms), objects);
+        let placed = placements::of_arrays(rows, parts.objects.len(), &before)?;
+        let instances = placed.iter().map(|placed| {
+            let own = parts.origins[placed.mesh];
+            placements::placed(placed.mesh as u32, &placed.rows, own, parts.local.origin)
         });
-        let instances = memory::collected(instances, rows.len(), "instances")?;
+        let instances = memory::collected(instances, placed.len(), "instances")?;
         // A sole owner changes the world in place.
         drop(data);
         Self::change(slf, threads, |world, parts| {
@@ -243,42 +216,11 @@ impl World {
         threads: Option<ThreadCount>,
     ) -> PyResult<()> {
         let data = slf.as_super().get().data();
-        let parts = &data.parts;
-        let mut moved = Vec::new();
-        for (mesh, vertices) in vertices {
+        let moved = vertices.iter().map(|(mesh, vertices)| {
             let mesh: i64 = mesh.extract()?;
-            let count = parts.parts.len();
-            let Some(place) = usize::try_from(mesh).ok().filter(|&place| place < count) else {
-                return Err(PyIndexError::new_err(format!(
-                    "vertices: found mesh {mesh}, but there are {count} meshes"
-                )));
-            };
-            let Part::Mesh {
-                positions, indices, ..
-            } = &*parts.parts[place]
-            else {
-                return Err(PyValueError::new_err(format!(
-                    "vertices: found mesh {place}, which is curves, wanted a mesh of triangles"
-                )));
-            };
-            let numbers = Numbers::read(&vertices, "vertices", 3)?;
-            if numbers.rows()? != positions.len() {
-                let wanted = shape_text(&[positions.len(), 3]);
-                return Err(wrong_shape("vertices", numbers.shape(), &wanted));
-            }
-            let origin = parts.origins.get(place);
-            let local = LocalOrigin {
-                origin: *origin.unwrap_or(&parts.local.origin),
-            };
-            let operand = Operand::new(&numbers, 3, numbers.lead(3));
-            let points = (0..positions.len()).map(|vertex| local.local(operand.vector(vertex)));
-            let part = Part::Mesh {
-                positions: memory::collected(points, positions.len(), "vertices")?,
-                indices: indices.clone(),
-                opacity: None,
-            };
-            moved.push((place, Arc::new(part)));
-        }
+            moved(&data.parts, mesh, &vertices)
+        });
+        let moved = moved.collect::<PyResult<Vec<_>>>()?;
         drop(data);
         Self::change(slf, threads, |world, parts| {
             let mut next = parts.clone();
@@ -288,10 +230,10 @@ impl World {
             let objects = next.objects.len();
             let mut lists: Vec<(u32, Vec<Geometry<'_>>)> = Vec::new();
             for &(place, _) in moved.iter().filter(|(place, _)| *place < objects) {
-                lists.push((place as u32, geometries(&next, &next.objects[place])));
+                lists.push((place as u32, next.geometries(&next.objects[place])));
             }
             if moved.iter().any(|(place, _)| *place >= objects) {
-                lists.push((antumbra::World::GROUND, geometries(&next, &next.world)));
+                lists.push((antumbra::World::GROUND, next.geometries(&next.world)));
             }
             let lists: Vec<_> = lists
                 .iter()
@@ -356,12 +298,9 @@ impl World {
         adopt: bool,
         threads: Option<ThreadCount>,
     ) -> PyResult<ChildOrder> {
-        let conditions = Conditions::default();
-        let arguments = RayArguments::read(origins, directions, distance, near, conditions)?;
+        let arguments = RayArguments::read((origins, directions), (near, distance), (None, None))?;
         let data = slf.as_super().get().data();
-        let rays = arguments.rays(&data)?;
-        let closed = |place| rays.get(place).closed();
-        let rays = memory::collected((0..rays.len()).map(closed), rays.len(), "rays")?;
+        let rays = arguments.closed(&data)?;
         let of_call = Threads::of(threads)?;
         let order = slf.py().detach(|| {
             let mut copy = data.world().cloned();
@@ -476,9 +415,7 @@ impl World {
         py: Python<'py>,
         path: PathBuf,
     ) -> PyResult<Bound<'py, Self>> {
-        let data = py.detach(|| saved::load(&path))?;
-        saved::expect_world(&data, true)?;
-        Self::with(py, data)
+        Self::with(py, saved::load(py, &path, true)?)
     }
 
     /// World of the bytes that pickle keeps.
@@ -486,87 +423,40 @@ impl World {
     #[pyo3(name = "_from_bytes")]
     fn from_bytes<'py>(
         py: Python<'py>,
-        bytes: numpy::PyReadonlyArray1<'_, u8>,
+        bytes: PyReadonlyArray1<'_, u8>,
     ) -> PyResult<Bound<'py, Self>> {
-        let bytes = bytes.as_slice()?;
-        Self::with(py, py.detach(|| saved::from_bytes(bytes))?)
-    }
-
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py, (Bound<'py, PyArray1<u8>>,)> {
-        let py = slf.py();
-        let data = slf.as_super().get().data();
-        let bytes = py.detach(|| saved::to_bytes(&data))?;
-        let restore = slf.get_type().getattr("_from_bytes")?;
-        Ok((restore, (PyArray1::from_vec(py, bytes),)))
+        Self::with(py, saved::from_array(py, &bytes)?)
     }
 }
 
-/// Geometries of some parts.
-fn geometries<'a>(parts: &'a Parts, list: &[u32]) -> Vec<Geometry<'a>> {
-    let list = list.iter().map(|&part| &parts.parts[part as usize]);
-    list.map(|part| part.geometry()).collect()
-}
-
-/// Object and matrix of every instance. Without objects, instances place what they placed before, or the one object.
-fn rows(
-    transforms: Option<&Bound<'_, PyAny>>,
-    objects: Option<&Bound<'_, PyAny>>,
-    count: usize,
-    before: &[u32],
-) -> PyResult<Vec<(usize, [[f64; 4]; 3])>> {
-    let Some(transforms) = transforms else {
-        return match objects {
-            None => Ok(Vec::new()),
-            Some(_) => Err(PyValueError::new_err(
-                "transforms: found none beside objects, wanted shape (k, 4, 4) or (k, 3, 4)",
-            )),
-        };
+/// A mesh of a world with other vertices, and its number.
+fn moved(parts: &Parts, mesh: i64, vertices: &Bound<'_, PyAny>) -> PyResult<(usize, Arc<Part>)> {
+    let count = parts.parts.len();
+    let Some(place) = usize::try_from(mesh).ok().filter(|&place| place < count) else {
+        return Err(PyIndexError::new_err(format!(
+            "vertices: found mesh {mesh}, but there are {count} meshes"
+        )));
     };
-    let matrices = Numbers::read(transforms, "transforms", 4)?;
-    let (instances, rows) = match *matrices.shape() {
-        [instances, rows @ (3 | 4), 4] => (instances, rows),
-        [0, 4] => (0, 4),
-        _ => {
-            let wanted = "(k, 4, 4) or (k, 3, 4)";
-            return Err(wrong_shape("transforms", matrices.shape(), wanted));
-        }
+    let Some((positions, indices)) = parts.parts[place].triangles() else {
+        return Err(PyValueError::new_err(format!(
+            "vertices: found mesh {place}, which is curves, wanted a mesh of triangles"
+        )));
     };
-    let named = match objects {
-        Some(objects) => {
-            let numbers = Numbers::whole(objects, "objects")?;
-            if !numbers.shape().is_empty() && numbers.shape() != [instances] {
-                let wanted = format!("() or ({instances},)");
-                return Err(wrong_shape("objects", numbers.shape(), &wanted));
-            }
-            bake::each(&numbers, instances)?
-        }
-        None if before.len() == instances => before.iter().map(|&object| object.into()).collect(),
-        None if count == 1 || instances == 0 => memory::filled(0.0, instances, "instances")?,
-        None => {
-            return Err(PyValueError::new_err(format!(
-                "objects: found none, wanted which of {count} meshes each of {instances} instances places"
-            )));
-        }
-    };
-    // A matrix that stands for all is in memory once.
-    let lead = matrices.lead(4);
-    let operand = Operand::new(&matrices, 4, lead);
-    let row = |place| operand.row(place);
-    let mut placements = memory::room(instances, "instances")?;
-    for (instance, &object) in named.iter().enumerate() {
-        if !(object >= 0.0 && object < count as f64) {
-            return Err(PyIndexError::new_err(format!(
-                "objects: instance {instance} names mesh {object}, but there are {count} meshes"
-            )));
-        }
-        let first = instance * rows;
-        if rows == 4 && row(first + 3) != [0.0, 0.0, 0.0, 1.0] {
-            return Err(PyValueError::new_err(format!(
-                "transforms: the last row of instance {instance} is {:?}, wanted [0, 0, 0, 1]",
-                row(first + 3)
-            )));
-        }
-        placements.push((object as usize, [0, 1, 2].map(|axis| row(first + axis))));
+    let numbers = Numbers::read(vertices, "vertices", 3)?;
+    if numbers.rows()? != positions.len() {
+        let wanted = shape_text(&[positions.len(), 3]);
+        return Err(wrong_shape("vertices", numbers.shape(), &wanted));
     }
-    Ok(placements)
+    let origin = parts.origins.get(place);
+    let local = LocalOrigin {
+        origin: *origin.unwrap_or(&parts.local.origin),
+    };
+    let operand = Operand::new(&numbers, 3, numbers.lead(3));
+    let points = (0..positions.len()).map(|vertex| local.local(operand.vector(vertex)));
+    let part = Part::Mesh {
+        positions: memory::collected(points, positions.len(), "vertices")?,
+        indices: indices.to_vec(),
+        opacity: None,
+    };
+    Ok((place, Arc::new(part)))
 }

@@ -3,19 +3,22 @@
 //! All numbers are little-endian. A file is a signature, the length of the meshes and their checksum (XXH3), the meshes, and
 //! the tree. Files are not trusted: lengths are checked before memory is taken, and the kernel checks its tree.
 
+use std::io::{Error, ErrorKind, Read};
 use std::path::Path;
 use std::sync::Arc;
 
 use antumbra::shapes::Sphere;
 use antumbra::{Bvh, Instance, LocalOrigin, World};
 use antumbra_image::atomic_write;
-use pyo3::exceptions::{PyOSError, PyValueError};
+use numpy::PyReadonlyArray1;
+use pyo3::exceptions::{PyFileNotFoundError, PyOSError, PyValueError};
 use pyo3::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
 
-use crate::curves::{Place, Segments};
-use crate::geometry::{Part, Parts};
-use crate::scene::{Quality, SceneData, Tree, raised};
+use super::curves::{Place, Segments};
+use super::parts::{Part, Parts};
+use super::{Quality, SceneData, Tree};
+use crate::errors::raised;
 
 /// What pickle keeps of an object: a function that makes it again, and arguments of that function.
 pub type Reduced<'py, A> = PyResult<(Bound<'py, PyAny>, A)>;
@@ -35,24 +38,41 @@ const HEAD: usize = 24;
 
 pub fn save(scene: &SceneData, path: &Path) -> PyResult<()> {
     let bytes = to_bytes(scene)?;
-    let written = atomic_write(path, |file| std::io::Write::write_all(file, &bytes));
+    let written = atomic_write(path, |file| file.write_all(&bytes));
     written.map_err(|error: antumbra_image::Error| PyOSError::new_err(error.to_string()))
 }
 
-pub fn load(path: &Path) -> PyResult<Arc<SceneData>> {
+pub fn load(py: Python<'_>, path: &Path, is_world: bool) -> PyResult<Arc<SceneData>> {
     let read = || {
         let mut bytes = Vec::new();
-        std::io::Read::read_to_end(&mut antumbra_files::open(path)?, &mut bytes)?;
+        antumbra_files::open(path)?.read_to_end(&mut bytes)?;
         Ok(bytes)
     };
-    let bytes: Vec<u8> = read().map_err(|error: std::io::Error| {
-        let text = format!("{}: {error}", path.display());
-        match error.kind() {
-            std::io::ErrorKind::NotFound => pyo3::exceptions::PyFileNotFoundError::new_err(text),
-            _ => PyOSError::new_err(text),
-        }
+    let data = py.detach(|| {
+        let bytes = read().map_err(|error: Error| {
+            let text = format!("{}: {error}", path.display());
+            match error.kind() {
+                ErrorKind::NotFound => PyFileNotFoundError::new_err(text),
+                _ => PyOSError::new_err(text),
+            }
+        })?;
+        from_bytes(&bytes)
     })?;
-    from_bytes(&bytes)
+    match (data.world().is_some(), is_world) {
+        (true, false) => Err(PyValueError::new_err(
+            "cannot read the scene: the file has a world, use World.load",
+        )),
+        (false, true) => Err(PyValueError::new_err(
+            "cannot read the world: the file has a scene, use Scene.load",
+        )),
+        _ => Ok(data),
+    }
+}
+
+/// What a pickle holds.
+pub fn from_array(py: Python<'_>, bytes: &PyReadonlyArray1<'_, u8>) -> PyResult<Arc<SceneData>> {
+    let bytes = bytes.as_slice()?;
+    py.detach(|| from_bytes(bytes))
 }
 
 pub fn to_bytes(scene: &SceneData) -> PyResult<Vec<u8>> {
@@ -104,20 +124,7 @@ pub fn to_bytes(scene: &SceneData) -> PyResult<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Refuses a world where a scene is wanted, and the other way round.
-pub fn expect_world(data: &SceneData, wanted: bool) -> PyResult<()> {
-    match (data.world().is_some(), wanted) {
-        (true, false) => Err(PyValueError::new_err(
-            "cannot read the scene: the file has a world, use World.load",
-        )),
-        (false, true) => Err(PyValueError::new_err(
-            "cannot read the world: the file has a scene, use Scene.load",
-        )),
-        _ => Ok(()),
-    }
-}
-
-pub fn from_bytes(bytes: &[u8]) -> PyResult<Arc<SceneData>> {
+fn from_bytes(bytes: &[u8]) -> PyResult<Arc<SceneData>> {
     let damaged = || PyValueError::new_err("cannot read the scene: the file is damaged");
     if bytes.len() < HEAD || bytes[..7] != SIGNATURE[..7] {
         return Err(PyValueError::new_err(

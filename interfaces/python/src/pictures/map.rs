@@ -7,9 +7,8 @@ use pyo3::exceptions::{PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::arrays::{Numbers, wrong_shape};
-use crate::broadcast::Operand;
-use crate::memory;
+use crate::arrays::{Numbers, memory, shaped, wrong_shape};
+use crate::errors::wrong;
 
 /// Name of what a map holds, where there is no memory for it.
 const CELLS: &str = "numbers of cells";
@@ -72,20 +71,9 @@ struct Words {
     unit: String,
 }
 
-/// Numbers of a grid, with its number of rows and columns.
+/// Numbers of a grid, its height and its width.
 fn grid(array: &Bound<'_, PyAny>, name: &'static str) -> PyResult<(Vec<f32>, usize, usize)> {
-    let numbers = Numbers::read(array, name, 1)?;
-    let [height, width] = numbers.shape()[..] else {
-        return Err(wrong_shape(name, numbers.shape(), "(height, width)"));
-    };
-    let operand = Operand::new(&numbers, 1, numbers.shape());
-    let count = height * width;
-    let values = (0..count).map(|place| operand.number(place) as f32);
-    Ok((memory::collected(values, count, CELLS)?, height, width))
-}
-
-fn bad(error: Error) -> PyErr {
-    PyValueError::new_err(error.to_string())
+    Numbers::read(array, name, 1)?.grid(CELLS)
 }
 
 #[pymethods]
@@ -134,7 +122,7 @@ impl Map {
             .transpose()?;
         let steps = match range {
             Some((low, high)) if !(low < high && (high - low).is_finite()) => {
-                return Err(bad(Error::Range(low, high)));
+                return Err(wrong(Error::Range(low, high)));
             }
             Some((low, high)) => Steps::between(low, high, false),
             None => Steps::around(&values, false),
@@ -169,7 +157,7 @@ impl Map {
             theme: if dark { Theme::Dark } else { Theme::Light },
         };
         let size = size.map_or_else(|| sheet.usual_size(), |(width, height)| [width, height]);
-        let drawing = py.detach(|| sheet.draw(size)).map_err(bad)?;
+        let drawing = py.detach(|| sheet.draw(size)).map_err(wrong)?;
         let words = Words {
             title: title.to_owned(),
             subtitle: subtitle.to_owned(),
@@ -216,11 +204,11 @@ impl Map {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         let bytes = match extension.to_ascii_lowercase().as_str() {
             "png" => {
-                let picture = py.detach(|| self.drawing.pixels()).map_err(bad)?;
+                let picture = py.detach(|| self.drawing.pixels()).map_err(wrong)?;
                 return py.detach(|| picture.write(&path)).map_err(unwritten);
             }
-            "svg" => self.drawing.svg().map_err(bad)?.into_bytes(),
-            "pdf" => py.detach(|| self.drawing.pdf()).map_err(bad)?,
+            "svg" => self.drawing.svg().map_err(wrong)?.into_bytes(),
+            "pdf" => py.detach(|| self.drawing.pdf()).map_err(wrong)?,
             _ => {
                 let path = path.display();
                 let reason = format!("{path}: maps are written as .png, .svg or .pdf");
@@ -267,7 +255,7 @@ impl Map {
             }
         };
         let shape = [self.height, self.width];
-        let values = crate::arrays::shaped(py, self.values.clone(), &shape)?;
+        let values = shaped(py, self.values.clone(), &shape)?;
         let [east, north] = [self.width, self.height].map(|count| count as f64 * self.cell);
         let options = PyDict::new(py);
         options.set_item("cmap", "viridis")?;
@@ -322,10 +310,8 @@ impl Map {
 
     /// The map as PNG, for notebooks.
     fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let picture = py.detach(|| self.drawing.pixels()).map_err(bad)?;
-        let bytes = picture.to_png();
-        let bytes = bytes.map_err(|error| PyValueError::new_err(error.to_string()))?;
-        Ok(PyBytes::new(py, &bytes))
+        let picture = py.detach(|| self.drawing.pixels()).map_err(wrong)?;
+        Ok(PyBytes::new(py, &picture.to_png().map_err(wrong)?))
     }
 
     fn __repr__(&self) -> String {

@@ -3,16 +3,16 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use numpy::PyArray1;
+use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyType;
 
-use crate::methods::{Queries, read_masks};
-use crate::rays::{Call, Conditions, RayArguments, RaySource};
-use crate::saved::Reduced;
-use crate::scene::{self, Quality, SceneData};
-use crate::threads::ThreadCount;
-use crate::{file, memory, meshes, saved};
+use super::Queries;
+use crate::arrays::masks;
+use crate::call::Call;
+use crate::call::threads::ThreadCount;
+use crate::rays::arguments::RayArguments;
+use crate::scene::{self, Quality, SceneData, Use, file, meshes, saved};
 
 /// Meshes that stay where they are, ready for queries about rays and points.
 ///
@@ -71,10 +71,7 @@ pub struct Scene;
 
 impl Scene {
     fn with(py: Python<'_>, data: Arc<SceneData>) -> PyResult<Bound<'_, Self>> {
-        Bound::new(
-            py,
-            PyClassInitializer::from(Queries::from(data)).add_subclass(Self),
-        )
+        Bound::new(py, Queries::extended(data, Self))
     }
 }
 
@@ -95,11 +92,11 @@ impl Scene {
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<PyClassInitializer<Self>> {
         let quality = Quality::read(quality)?;
-        let mut call = Call::new(threads, progress)?;
+        let mut call = Call::new(py, threads, progress)?;
         let mut parts = meshes::read(vertices, faces, instances, origin)?;
-        parts.masks = read_masks(masks, "masks", parts.parts.len())?;
-        let data = scene::build(py, parts, &[], quality, &mut call)?;
-        Ok(PyClassInitializer::from(Queries::from(data)).add_subclass(Self))
+        parts.masks = self::masks(masks, "masks", parts.parts.len())?;
+        let data = scene::build(&mut call, parts, quality, Use::Fixed(&[]))?;
+        Ok(Queries::extended(data, Self))
     }
 
     /// Reads a scene from a file.
@@ -145,9 +142,10 @@ impl Scene {
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, Self>> {
         let quality = Quality::read(quality)?;
-        let mut call = Call::new(threads, progress)?;
+        let mut call = Call::new(py, threads, progress)?;
         let parts = file::read(py, &path)?;
-        Self::with(py, scene::build(py, parts, &[], quality, &mut call)?)
+        let data = scene::build(&mut call, parts, quality, Use::Fixed(&[]))?;
+        Self::with(py, data)
     }
 
     /// A scene of a grid of heights, such as a digital elevation model.
@@ -204,12 +202,13 @@ impl Scene {
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, Self>> {
         let quality = Quality::read(quality)?;
-        let mut call = Call::new(threads, progress)?;
+        let mut call = Call::new(py, threads, progress)?;
         let grid = py.import("antumbra._meshes")?.getattr("grid")?;
         let (vertices, faces): (Bound<'py, PyAny>, Bound<'py, PyAny>) =
             grid.call1((heights, transform))?.extract()?;
         let parts = meshes::read(&vertices, Some(&faces), None, origin)?;
-        Self::with(py, scene::build(py, parts, &[], quality, &mut call)?)
+        let data = scene::build(&mut call, parts, quality, Use::Fixed(&[]))?;
+        Self::with(py, data)
     }
 
     /// A scene of the same triangles, whose tree is learned from these rays: a few thousand like those to come.
@@ -257,15 +256,15 @@ impl Scene {
         threads: Option<ThreadCount>,
         progress: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, Self>> {
-        let conditions = Conditions::default();
-        let arguments = RayArguments::read(origins, directions, distance, near, conditions)?;
-        let mut call = Call::new(threads, progress)?;
+        let arguments = RayArguments::read((origins, directions), (near, distance), (None, None))?;
+        let mut call = Call::new(py, threads, progress)?;
         let data = slf.as_super().get().data();
-        let rays = arguments.rays(&data)?;
-        let closed = |place| rays.get(place).closed();
-        let rays = memory::collected((0..rays.len()).map(closed), rays.len(), "rays")?;
-        let parts = (*data.parts).clone();
-        Self::with(py, scene::build(py, parts, &rays, data.quality, &mut call)?)
+        let rays = arguments.closed(&data)?;
+        let (parts, quality) = ((*data.parts).clone(), data.quality);
+        Self::with(
+            py,
+            scene::build(&mut call, parts, quality, Use::Fixed(&rays))?,
+        )
     }
 
     /// Reads a scene that ``save`` wrote.
@@ -300,9 +299,7 @@ impl Scene {
         py: Python<'py>,
         path: PathBuf,
     ) -> PyResult<Bound<'py, Self>> {
-        let data = py.detach(|| saved::load(&path))?;
-        saved::expect_world(&data, false)?;
-        Self::with(py, data)
+        Self::with(py, saved::load(py, &path, false)?)
     }
 
     /// Scene of the bytes that pickle keeps.
@@ -310,18 +307,8 @@ impl Scene {
     #[pyo3(name = "_from_bytes")]
     fn from_bytes<'py>(
         py: Python<'py>,
-        bytes: numpy::PyReadonlyArray1<'_, u8>,
+        bytes: PyReadonlyArray1<'_, u8>,
     ) -> PyResult<Bound<'py, Self>> {
-        let bytes = bytes.as_slice()?;
-        Self::with(py, py.detach(|| saved::from_bytes(bytes))?)
-    }
-
-    /// The bytes lie in an array: protocol 5 of pickle need not copy them.
-    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py, (Bound<'py, PyArray1<u8>>,)> {
-        let py = slf.py();
-        let data = slf.as_super().get().data();
-        let bytes = py.detach(|| saved::to_bytes(&data))?;
-        let restore = slf.get_type().getattr("_from_bytes")?;
-        Ok((restore, (PyArray1::from_vec(py, bytes),)))
+        Self::with(py, saved::from_array(py, &bytes)?)
     }
 }

@@ -6,9 +6,10 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice};
 
 use super::{Columns, Hits, Source, State};
-use crate::arrays::shaped;
-use crate::saved::Reduced;
-use crate::{html, memory};
+use crate::arrays::{from_start, memory, shaped};
+use crate::errors::wrong;
+use crate::html;
+use crate::scene::saved::Reduced;
 
 /// All hits of rays, one list after the other: hits of ray ``i`` are at ``splits[i]:splits[i + 1]``, the nearest first.
 ///
@@ -53,9 +54,7 @@ impl HitList {
     #[getter]
     fn ray<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArrayDyn<i64>>> {
         let py = slf.py();
-        let splits = slf.get().splits.bind(py).try_readonly();
-        let splits =
-            splits.map_err(|error| pyo3::exceptions::PyValueError::new_err(error.to_string()))?;
+        let splits = slf.get().splits.bind(py).try_readonly().map_err(wrong)?;
         let hits = slf.as_super().get().arrays.t.bind(py).len();
         let mut rays = memory::room(hits, "rays of hits")?;
         for (ray, ends) in splits.as_slice()?.windows(2).enumerate() {
@@ -79,18 +78,8 @@ impl HitList {
                 "index: found {found}, wanted the number of one ray; arrays such as .t and .ray have all hits"
             )));
         };
-        let place = match index < 0 {
-            true => index.saturating_add_unsigned(rays),
-            false => index,
-        };
-        let place = match usize::try_from(place) {
-            Ok(place) if place < rays => place,
-            _ => {
-                return Err(PyIndexError::new_err(format!(
-                    "ray {index} of hits of {rays} rays"
-                )));
-            }
-        };
+        let place = from_start(index, rays)
+            .ok_or_else(|| PyIndexError::new_err(format!("ray {index} of hits of {rays} rays")))?;
         let ends: [i64; 2] = [
             splits.get_item(place)?.extract()?,
             splits.get_item(place + 1)?.extract()?,

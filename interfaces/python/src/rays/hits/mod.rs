@@ -8,6 +8,7 @@ mod list;
 mod source;
 
 use numpy::{Element, PyArrayDyn, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::basic::CompareOp;
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -19,12 +20,12 @@ pub use list::HitList;
 use source::Meshes;
 pub use source::Source;
 
-use crate::arrays::shaped;
-use crate::geometry::Ids;
+use crate::arrays::{memory, shape_text, shaped};
+use crate::call::threads::Threads;
+use crate::errors::wrong;
 use crate::html;
-use crate::memory;
-use crate::saved::Reduced;
-use crate::threads::Threads;
+use crate::scene::parts::Ids;
+use crate::scene::saved::Reduced;
 
 /// Hits whose points or normals a thread computes at a time. Fewer stay on the calling thread.
 const SOME: usize = 1 << 13;
@@ -38,6 +39,15 @@ struct Arrays {
     uv: Py<PyArrayDyn<f32>>,
     point: PyOnceLock<Py<PyArrayDyn<f64>>>,
     normal: PyOnceLock<Py<PyArrayDyn<f32>>>,
+}
+
+/// One hit of the arrays, and its place in them.
+#[derive(Clone, Copy)]
+struct At {
+    ids: Ids,
+    uv: [f32; 2],
+    t: f32,
+    place: usize,
 }
 
 impl Arrays {
@@ -65,28 +75,32 @@ impl Arrays {
         &self,
         py: Python<'_>,
         nothing: T,
-        of: impl Fn(Ids, [f32; 2], f32, usize) -> Option<T> + Sync + Send,
+        of: impl Fn(At) -> Option<T> + Sync + Send,
     ) -> PyResult<Vec<T>> {
-        let read = |array: &Py<PyArrayDyn<i32>>| array.bind(py).try_readonly();
-        let error =
-            |error: numpy::BorrowError| pyo3::exceptions::PyValueError::new_err(error.to_string());
-        let triangle = read(&self.triangle).map_err(error)?;
-        let mesh = read(&self.mesh).map_err(error)?;
-        let instance = read(&self.instance).map_err(error)?;
-        let t = self.t.bind(py).try_readonly().map_err(error)?;
-        let uv = self.uv.bind(py).try_readonly().map_err(error)?;
-        let uv = uv.as_slice()?;
+        let read = |array: &Py<PyArrayDyn<i32>>| array.bind(py).try_readonly().map_err(wrong);
+        let ids = [
+            read(&self.triangle)?,
+            read(&self.mesh)?,
+            read(&self.instance)?,
+        ];
+        let t = self.t.bind(py).try_readonly().map_err(wrong)?;
+        let uv = self.uv.bind(py).try_readonly().map_err(wrong)?;
+        let (t, uv) = (t.as_slice()?, uv.as_slice()?);
+        let [triangle, mesh, instance] = &ids;
         let (triangle, mesh, instance) =
             (triangle.as_slice()?, mesh.as_slice()?, instance.as_slice()?);
-        let t = t.as_slice()?;
         let item = |place: usize| {
-            let ids = Ids {
-                triangle: triangle[place],
-                mesh: mesh[place],
-                instance: instance[place],
+            let hit = At {
+                ids: Ids {
+                    triangle: triangle[place],
+                    mesh: mesh[place],
+                    instance: instance[place],
+                },
+                uv: [uv[2 * place], uv[2 * place + 1]],
+                t: t[place],
+                place,
             };
-            let weights = [uv[2 * place], uv[2 * place + 1]];
-            of(ids, weights, t[place], place).unwrap_or(nothing)
+            of(hit).unwrap_or(nothing)
         };
         let threads = Threads::of(None)?;
         let count = triangle.len();
@@ -103,48 +117,49 @@ impl Arrays {
         })
     }
 
+    /// Points of hits, computed once.
     fn point<'py>(
         &self,
         py: Python<'py>,
         source: Option<&Source>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let made = self.point.get_or_try_init(py, || {
-            let source = source.ok_or_else(gone)?;
-            let meshes = Meshes::of(&source.parts);
-            let points = self.each(py, [f64::NAN; 3], |ids, uv, t, place| {
-                if ids.triangle < 0 {
-                    return None;
-                }
-                meshes
-                    .point(ids, uv)
-                    .or_else(|| source.point_on_ray(t, place))
-            })?;
-            Ok::<_, PyErr>(
-                shaped(py, points.into_flattened(), &self.shape_of_vectors(py))?.unbind(),
-            )
-        })?;
-        Ok(made.bind(py).clone())
+        let of = |source: &Source, meshes: &Meshes<'_>, hit: At| {
+            meshes
+                .point(hit.ids, hit.uv)
+                .or_else(|| source.point_on_ray(hit.t, hit.place))
+        };
+        self.vectors(py, &self.point, source, f64::NAN, of)
     }
 
+    /// Normals of hits, computed once.
     fn normal<'py>(
         &self,
         py: Python<'py>,
         source: Option<&Source>,
     ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
-        let made = self.normal.get_or_try_init(py, || {
+        let of = |source: &Source, meshes: &Meshes<'_>, hit: At| {
+            meshes.normal(hit.ids).or_else(|| source.normal_on_ray(hit))
+        };
+        self.vectors(py, &self.normal, source, f32::NAN, of)
+    }
+
+    /// Vectors of hits, `nothing` for misses, computed once.
+    fn vectors<'py, T: Element + Copy + Sync>(
+        &self,
+        py: Python<'py>,
+        known: &PyOnceLock<Py<PyArrayDyn<T>>>,
+        source: Option<&Source>,
+        nothing: T,
+        of: impl Fn(&Source, &Meshes<'_>, At) -> Option<[T; 3]> + Sync + Send,
+    ) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
+        let made = known.get_or_try_init(py, || {
             let source = source.ok_or_else(gone)?;
             let meshes = Meshes::of(&source.parts);
-            let normals = self.each(py, [f32::NAN; 3], |ids, uv, t, place| {
-                if ids.triangle < 0 {
-                    return None;
-                }
-                meshes
-                    .normal(ids)
-                    .or_else(|| source.normal_on_ray(ids, uv, t, place))
+            let vectors = self.each(py, [nothing; 3], |hit| {
+                (hit.ids.triangle >= 0).then(|| of(source, &meshes, hit))?
             })?;
-            Ok::<_, PyErr>(
-                shaped(py, normals.into_flattened(), &self.shape_of_vectors(py))?.unbind(),
-            )
+            let vectors = shaped(py, vectors.into_flattened(), &self.shape_of_vectors(py))?;
+            Ok::<_, PyErr>(vectors.unbind())
         })?;
         Ok(made.bind(py).clone())
     }
@@ -277,7 +292,7 @@ impl Hits {
     pub fn html(&self, py: Python<'_>, name: &str, asked: &str) -> PyResult<String> {
         let (hits, all) = self.counts(py)?;
         let share = html::percent(hits as f64 / all as f64);
-        let shape = crate::arrays::shape_text(&self.arrays.shape(py));
+        let shape = shape_text(&self.arrays.shape(py));
         let hits = format!("{hits} of {all} {asked} ({share})");
         Ok(html::table(name, &[("shape", shape), ("hit", hits)]))
     }
@@ -402,10 +417,8 @@ impl Hits {
     /// Whether the ray hits anything: bool.
     #[getter]
     fn hit<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.arrays
-            .triangle
-            .bind(py)
-            .rich_compare(0, pyo3::basic::CompareOp::Ge)
+        let triangle = self.arrays.triangle.bind(py);
+        triangle.rich_compare(0, CompareOp::Ge)
     }
 
     /// Point of the triangle that is hit: float64 of shape (..., 3). Made on first use.
@@ -425,7 +438,7 @@ impl Hits {
     #[getter]
     fn curve<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<i32>>> {
         let parts = &self.source.as_ref().ok_or_else(gone)?.parts;
-        let of = |ids, [u, _]: [f32; 2], _, _| Some(parts.along_curve(ids, u)?.0);
+        let of = |hit: At| Some(parts.along_curve(hit.ids, hit.uv[0])?.0);
         let curves = self.arrays.each(py, -1, of)?;
         shaped(py, curves, &self.arrays.shape(py))
     }
@@ -437,7 +450,7 @@ impl Hits {
     #[getter]
     fn along<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         let parts = &self.source.as_ref().ok_or_else(gone)?.parts;
-        let of = |ids, [u, _]: [f32; 2], _, _| Some(parts.along_curve(ids, u)?.1);
+        let of = |hit: At| Some(parts.along_curve(hit.ids, hit.uv[0])?.1);
         let along = self.arrays.each(py, f32::NAN, of)?;
         shaped(py, along, &self.arrays.shape(py))
     }

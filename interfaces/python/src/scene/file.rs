@@ -10,7 +10,7 @@ use antumbra_render::Lowered;
 use pyo3::exceptions::{PyFileNotFoundError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 
-use crate::geometry::{Part, Parts};
+use super::parts::{Part, Parts};
 
 /// What a file holds, instances as they are.
 pub fn read(py: Python<'_>, path: &Path) -> PyResult<Parts> {

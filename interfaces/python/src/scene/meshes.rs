@@ -2,16 +2,15 @@
 
 use std::sync::Arc;
 
-use antumbra::{Instance, LocalOrigin};
+use antumbra::LocalOrigin;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::arrays::{Numbers, read_faces};
-use crate::broadcast::Operand;
-use crate::curves;
-use crate::geometry::{Part, Parts};
-use crate::memory;
-use crate::placements::{self, Placement};
+use super::curves;
+use super::parts::{Part, Parts};
+use super::placements::{self, Placement};
+use crate::arrays::broadcast::Operand;
+use crate::arrays::{Numbers, memory, read_faces, wrong_shape};
 
 /// Coordinates this many times as large as the scene is long are brought to an origin of their own: then single precision
 /// would lose more than two of its bits.
@@ -54,47 +53,12 @@ pub fn read<'py>(
     };
     let mut is_placed = vec![false; meshes.len()];
     let (placements, paths) = flat(&meshes, placements, &mut is_placed)?;
-    let local = match origin {
-        Some(origin) if !is_auto(origin)? => LocalOrigin {
-            origin: point(origin)?,
-        },
-        _ => LocalOrigin {
-            origin: automatic(&meshes, &is_placed, &placements),
-        },
-    };
-    let mut parts = Parts {
-        local,
+    let parts = assembled(meshes, &is_placed, &placements, origin)?;
+    Ok(Parts {
         paths,
-        ..Parts::default()
-    };
-    // Objects have origins of their own, which their placements make good.
-    let mut objects = vec![None; meshes.len()];
-    for (index, (mesh, is_placed)) in meshes.into_iter().zip(is_placed).enumerate() {
-        let own = if matches!(mesh, Item::Assembly(_)) {
-            local
-        } else if is_placed {
-            let own = LocalOrigin {
-                origin: far_middle(bounds(mesh.points())),
-            };
-            objects[index] = Some((parts.objects.len(), own));
-            parts.objects.push(vec![index as u32]);
-            own
-        } else {
-            parts.world.push(index as u32);
-            local
-        };
-        parts.parts.push(Arc::new(mesh.rounded(&own)?));
-    }
-    memory::grow(&mut parts.instances, placements.len(), "instances")?;
-    for placement in placements {
-        // The loop above made an object of every mesh that is placed.
-        let Some((object, own)) = objects[placement.mesh] else {
-            continue;
-        };
-        let instance = placements::placed(object as u32, &placement.rows, own.origin, local.origin);
-        parts.instances.push(instance);
-    }
-    Ok(parts)
+        origins: Vec::new(),
+        ..parts
+    })
 }
 
 /// Placements of meshes only, and paths to them if there are assemblies: places in the lists from the world inwards.
@@ -143,9 +107,9 @@ fn flat(
 pub fn objects<'py>(
     meshes: &Bound<'py, PyAny>,
     ground: Option<&Bound<'py, PyAny>>,
-    rows: impl FnOnce(usize) -> PyResult<Vec<(usize, [[f64; 4]; 3])>>,
+    rows: (Option<&Bound<'py, PyAny>>, Option<&Bound<'py, PyAny>>),
     origin: Option<&Bound<'py, PyAny>>,
-) -> PyResult<(Parts, Vec<Instance>)> {
+) -> PyResult<Parts> {
     let plain = |list: &Bound<'py, PyAny>, name: &str| {
         let (meshes, placements) = self::list(list)?;
         let is_assembly = |item: &Item<'_>| matches!(item, Item::Assembly(_));
@@ -158,43 +122,56 @@ pub fn objects<'py>(
     };
     let mut all = plain(meshes, "meshes")?;
     let objects = all.len();
-    let placements = rows(objects)?.into_iter();
-    let placements = placements.map(|(mesh, rows)| Placement { mesh, rows });
-    let placements: Vec<_> = placements.collect();
+    let placements = placements::of_arrays(rows, objects, &[])?;
     if let Some(ground) = ground {
         all.extend(plain(ground, "ground")?);
     }
     let is_object: Vec<_> = (0..all.len()).map(|mesh| mesh < objects).collect();
-    let local = match origin {
+    assembled(all, &is_object, &placements, origin)
+}
+
+/// Rounds meshes around one origin. Those that are objects have origins of their own, which their placements make good.
+fn assembled<'py>(
+    items: Vec<Item<'py>>,
+    is_object: &[bool],
+    placements: &[Placement],
+    origin: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Parts> {
+    let origin = match origin {
         Some(origin) if !is_auto(origin)? => point(origin)?,
-        _ => automatic(&all, &is_object, &placements),
+        _ => automatic(&items, is_object, placements),
     };
-    let local = LocalOrigin { origin: local };
+    let local = LocalOrigin { origin };
     let mut parts = Parts {
         local,
         ..Parts::default()
     };
-    for (index, mesh) in all.into_iter().enumerate() {
-        let own = match index < objects {
-            false => local,
-            true => LocalOrigin {
-                origin: far_middle(bounds(mesh.points())),
-            },
-        };
-        match index < objects {
-            true => {
-                parts.objects.push(vec![index as u32]);
-                parts.origins.push(own.origin);
-            }
-            false => parts.world.push(index as u32),
+    let mut objects = vec![None; items.len()];
+    for (index, item) in items.into_iter().enumerate() {
+        let mut own = local;
+        if matches!(item, Item::Assembly(_)) {
+            // Its instances are placed one by one.
+        } else if is_object[index] {
+            own.origin = far_middle(bounds(item.points()));
+            objects[index] = Some(parts.objects.len());
+            parts.objects.push(vec![index as u32]);
+            parts.origins.push(own.origin);
+        } else {
+            parts.world.push(index as u32);
         }
-        parts.parts.push(Arc::new(mesh.rounded(&own)?));
+        parts.parts.push(Arc::new(item.rounded(&own)?));
     }
-    let instances = placements.iter().map(|Placement { mesh, rows }| {
-        placements::placed(*mesh as u32, rows, parts.origins[*mesh], local.origin)
-    });
-    let instances = memory::collected(instances, placements.len(), "instances")?;
-    Ok((parts, instances))
+    memory::grow(&mut parts.instances, placements.len(), "instances")?;
+    for Placement { mesh, rows } in placements {
+        // The loop above made an object of every mesh that is placed.
+        let Some(object) = objects[*mesh] else {
+            continue;
+        };
+        let own = parts.origins[object];
+        let instance = placements::placed(object as u32, rows, own, local.origin);
+        parts.instances.push(instance);
+    }
+    Ok(parts)
 }
 
 fn is_auto(origin: &Bound<'_, PyAny>) -> PyResult<bool> {
@@ -212,11 +189,7 @@ fn is_auto(origin: &Bound<'_, PyAny>) -> PyResult<bool> {
 fn point(origin: &Bound<'_, PyAny>) -> PyResult<[f64; 3]> {
     let numbers = Numbers::read(origin, "origin", 3)?;
     if numbers.shape() != [3] {
-        return Err(crate::arrays::wrong_shape(
-            "origin",
-            numbers.shape(),
-            "(3,)",
-        ));
+        return Err(wrong_shape("origin", numbers.shape(), "(3,)"));
     }
     let point = Operand::new(&numbers, 3, &[]).vector(0);
     match point.iter().all(|x| x.is_finite()) {

@@ -15,8 +15,9 @@ use antumbra_bake::along_curve;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 
-use crate::memory;
-use crate::rays::Call;
+use crate::arrays::memory;
+use crate::call::Call;
+use crate::errors::failed;
 use crate::scene::SceneData;
 
 /// Rays of one thread between two looks for signals.
@@ -69,38 +70,35 @@ impl RayGroup {
     /// Whether anything is in the way of each ray.
     pub fn occluded(
         &self,
-        py: Python<'_>,
+        call: &mut Call<'_>,
         scene: &SceneData,
         answers: &mut [bool],
-        call: &mut Call<'_>,
     ) -> PyResult<()> {
         let threads = call.threads.clone();
-        let order = py.detach(|| threads.run(|| along_curve(&self.points)));
-        let order = order.map_err(crate::bake::failed)?;
+        let order = call.py.detach(|| threads.run(|| along_curve(&self.points)));
+        let order = order.map_err(failed)?;
         let points = order.iter().map(|&place| self.points[place as usize]);
         let points = memory::collected(points, order.len(), "points")?;
         let directions = Directions::new(&self.directions);
         let columns = self.directions.len();
         // Pieces have whole points. Progress counts rays, as in other calls about rays.
         let piece = (PIECE / columns).max(1) * columns;
-        call.in_pieces(py, points.len() * columns, piece, |rays, threads| {
+        call.in_pieces(points.len() * columns, piece, |rays, threads| {
             let first = rays.start / columns;
             let points = &points[first..rays.end / columns];
             let share = rays.len() / (4 * threads.count());
             let block = (share.clamp(RAYS.0, RAYS.1) / columns).clamp(1, MOST_POINTS);
-            py.detach(|| {
-                let of = |(index, points): (usize, &[[f32; 3]])| {
-                    let first = first + index * block;
-                    let bits = self.open(scene, points, &directions)?;
-                    Ok(Open { first, bits })
-                };
-                let blocks = points.par_chunks(block).enumerate();
-                let found: PyResult<Vec<Open>> = threads.run(|| blocks.map(of).collect());
-                for open in found? {
-                    self.write(&order[open.first..], &open.bits, answers);
-                }
-                Ok(())
-            })
+            let of = |(index, points): (usize, &[[f32; 3]])| {
+                let first = first + index * block;
+                let bits = self.open(scene, points, &directions)?;
+                Ok(Open { first, bits })
+            };
+            let blocks = points.par_chunks(block).enumerate();
+            let found: PyResult<Vec<Open>> = threads.run(|| blocks.map(of).collect());
+            for open in found? {
+                self.write(&order[open.first..], &open.bits, answers);
+            }
+            Ok(())
         })
     }
 

@@ -1,4 +1,9 @@
 //! Arrays of callers, read where they lie: any leading shape, any stride, any kind of real number.
+//!
+//! - here: arrays;  `broadcast`: their leading shapes;  `memory`: lists that may not fit
+
+pub mod broadcast;
+pub mod memory;
 
 use numpy::ndarray::{Array, IxDyn};
 use numpy::{
@@ -9,7 +14,9 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PySlice, PyTuple};
 
-use crate::memory;
+use broadcast::Operand;
+
+use crate::errors::wrong;
 
 /// Numbers of an argument, one after the other in memory, with the shape that the caller gave them.
 pub struct Numbers<'py> {
@@ -72,10 +79,7 @@ impl<'py> Numbers<'py> {
     pub fn whole(object: &Bound<'py, PyAny>, name: &'static str) -> PyResult<Self> {
         let array = as_array(object, name)?;
         if !matches!(array.dtype().kind(), b'i' | b'u') && !array.is_empty() {
-            let found = array.dtype().str()?;
-            return Err(PyTypeError::new_err(format!(
-                "{name}: found dtype {found}, wanted integers"
-            )));
+            return Err(wrong_type(name, &array, "integers"));
         }
         Self::read(array.as_any(), name, 1)
     }
@@ -109,6 +113,39 @@ impl<'py> Numbers<'py> {
         &self.held
     }
 
+    /// One number for each of `count` things: of shape (count,), or one for all.
+    pub fn each(&self, count: usize) -> PyResult<Vec<f64>> {
+        if !self.shape.is_empty() && self.shape != [count] {
+            let wanted = format!("() or ({count},)");
+            return Err(wrong_shape(self.name, &self.shape, &wanted));
+        }
+        let operand = Operand::new(self, 1, &[count]);
+        let all = (0..count).map(|place| operand.number(place));
+        memory::collected(all, count, self.name)
+    }
+
+    /// The vectors, broadcast to a shape, in single precision.
+    pub fn vectors(&self, shape: &[usize]) -> PyResult<Vec<[f32; 3]>> {
+        let operand = Operand::new(self, 3, shape);
+        let count = shape.iter().product();
+        let vectors = (0..count).map(|place| operand.vector(place).map(|x| x as f32));
+        memory::collected(vectors, count, self.name)
+    }
+
+    /// A grid of numbers in single precision, its height and its width. `what` names them where there is no memory.
+    pub fn grid(&self, what: &str) -> PyResult<(Vec<f32>, usize, usize)> {
+        let [height, width] = self.shape[..] else {
+            return Err(wrong_shape(self.name, &self.shape, "(height, width)"));
+        };
+        let operand = Operand::new(self, 1, &self.shape);
+        let values = (0..height * width).map(|place| operand.number(place) as f32);
+        Ok((
+            memory::collected(values, height * width, what)?,
+            height,
+            width,
+        ))
+    }
+
     /// Rows of an array of shape (n, 3).
     pub fn rows(&self) -> PyResult<usize> {
         match self.shape[..] {
@@ -122,30 +159,16 @@ impl<'py> Memory<'py> {
     /// Brings numbers into order, and to one of two types.
     fn of(array: Bound<'py, PyUntypedArray>, name: &str) -> PyResult<Self> {
         let dtype = array.dtype();
-        let real = matches!(dtype.kind(), b'f' | b'i' | b'u' | b'b');
-        if !real {
-            let found = dtype.str()?;
-            return Err(PyTypeError::new_err(format!(
-                "{name}: found dtype {found}, wanted real numbers"
-            )));
+        let (kind, size) = (dtype.kind(), dtype.itemsize());
+        if !matches!(kind, b'f' | b'i' | b'u' | b'b') {
+            return Err(wrong_type(name, &array, "real numbers"));
         }
-        let to = match (dtype.kind(), dtype.itemsize()) {
-            (b'f', 4) => "f4",
-            _ => "f8",
-        };
-        let native = dtype.kind() == b'f'
-            && matches!(dtype.itemsize(), 4 | 8)
-            && dtype.is_native_byteorder() != Some(false);
-        let array = if native && array.is_c_contiguous() && array.is_aligned() {
-            array.into_any()
+        let to = if (kind, size) == (b'f', 4) {
+            "f4"
         } else {
-            let py = array.py();
-            let numpy = py.import("numpy")?;
-            let options = PyDict::new(py);
-            options.set_item("dtype", to)?;
-            options.set_item("requirements", ("C", "A"))?;
-            numpy.call_method("require", (array,), Some(&options))?
+            "f8"
         };
+        let array = in_order(array, to, kind == b'f' && matches!(size, 4 | 8))?;
         Ok(match to {
             "f4" => Self::F32(readonly(&array)?),
             _ => Self::F64(readonly(&array)?),
@@ -153,9 +176,35 @@ impl<'py> Memory<'py> {
     }
 }
 
+/// An array in C order and of a type: the same one if it is that already, as `is_of_type` says but for the order of bytes.
+fn in_order<'py>(
+    array: Bound<'py, PyUntypedArray>,
+    to: &str,
+    is_of_type: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    let is_native = is_of_type && array.dtype().is_native_byteorder() != Some(false);
+    if is_native && array.is_c_contiguous() && array.is_aligned() {
+        return Ok(array.into_any());
+    }
+    let py = array.py();
+    let options = PyDict::new(py);
+    options.set_item("dtype", to)?;
+    options.set_item("requirements", ("C", "A"))?;
+    py.import("numpy")?
+        .call_method("require", (array,), Some(&options))
+}
+
+/// Error about a type.
+fn wrong_type(name: &str, array: &Bound<'_, PyUntypedArray>, wanted: &str) -> PyErr {
+    match array.dtype().str() {
+        Ok(found) => PyTypeError::new_err(format!("{name}: found dtype {found}, wanted {wanted}")),
+        Err(error) => error,
+    }
+}
+
 fn readonly<'py, T: Element>(array: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArrayDyn<'py, T>> {
     let array = array.cast::<PyArrayDyn<T>>()?;
-    (array.try_readonly()).map_err(|error| PyValueError::new_err(error.to_string()))
+    array.try_readonly().map_err(wrong)
 }
 
 /// The array that an argument is, or that numpy makes of it.
@@ -195,6 +244,39 @@ pub fn as_array<'py>(
     Ok(made.cast_into::<PyUntypedArray>()?)
 }
 
+/// A mask of 32 bits.
+pub fn mask(number: f64) -> PyResult<u32> {
+    match (0.0..=f64::from(u32::MAX)).contains(&number) {
+        true => Ok(number as u32),
+        false => Err(PyValueError::new_err(format!(
+            "mask: found {number}, wanted 0 to {}",
+            u32::MAX
+        ))),
+    }
+}
+
+/// Masks of so many things: none, one for all, or one for each.
+pub fn masks(
+    object: Option<&Bound<'_, PyAny>>,
+    name: &'static str,
+    count: usize,
+) -> PyResult<Vec<u32>> {
+    let Some(object) = object else {
+        return Ok(Vec::new());
+    };
+    let numbers = Numbers::whole(object, name)?.each(count)?;
+    numbers.into_iter().map(mask).collect()
+}
+
+/// Place of an index of Python, which counts from the end below 0; `None` beyond `len` items.
+pub fn from_start(index: isize, len: usize) -> Option<usize> {
+    let place = match index < 0 {
+        true => index.saturating_add_unsigned(len),
+        false => index,
+    };
+    usize::try_from(place).ok().filter(|&place| place < len)
+}
+
 /// Error about a shape.
 pub fn wrong_shape(name: &str, found: &[usize], wanted: &str) -> PyErr {
     let found = shape_text(found);
@@ -226,33 +308,20 @@ pub fn read_faces(
         return Ok(Vec::new());
     }
     if !matches!(dtype.kind(), b'i' | b'u') {
-        let found = dtype.str()?;
-        return Err(PyTypeError::new_err(format!(
-            "{name}: found dtype {found}, wanted integers"
-        )));
+        return Err(wrong_type(name, &array, "integers"));
     }
     if !matches!(shape[..], [_, 3]) {
         return Err(wrong_shape(name, &shape, "(m, 3)"));
     }
-    let py = object.py();
-    let options = PyDict::new(py);
-    options.set_item("requirements", ("C", "A"))?;
-    let direct = array.is_c_contiguous() && array.is_aligned();
-    let wanted = match (dtype.kind(), dtype.itemsize()) {
+    let to = match (dtype.kind(), dtype.itemsize()) {
         (b'i', 4) => "i4",
         (b'u', 4) => "u4",
         (b'u', 8) => "u8",
         _ => "i8",
     };
-    options.set_item("dtype", wanted)?;
-    let native = matches!(dtype.itemsize(), 4 | 8) && dtype.is_native_byteorder() != Some(false);
-    let array = if direct && native {
-        array.into_any()
-    } else {
-        py.import("numpy")?
-            .call_method("require", (array,), Some(&options))?
-    };
-    match wanted {
+    let is_native = matches!(dtype.itemsize(), 4 | 8);
+    let array = in_order(array, to, is_native)?;
+    match to {
         "i4" => corners::<i32>(&array, name, vertices),
         "u4" => corners::<u32>(&array, name, vertices),
         "u8" => corners::<u64>(&array, name, vertices),
@@ -292,8 +361,7 @@ pub fn shaped<'py, T: Element>(
     shape: &[usize],
 ) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
     let array = Array::from_shape_vec(IxDyn(shape), values);
-    let array = array.map_err(|error| PyValueError::new_err(error.to_string()))?;
-    Ok(PyArray::from_owned_array(py, array))
+    Ok(PyArray::from_owned_array(py, array.map_err(wrong)?))
 }
 
 /// The array that a caller wants answers in: of this type and shape, in C order.
@@ -302,7 +370,7 @@ pub fn output<'py, T: Element>(
     shape: &[usize],
     dtype: &str,
 ) -> PyResult<PyReadwriteArrayDyn<'py, T>> {
-    let wrong = |found: String| {
+    let unfit = |found: String| {
         let wanted = shape_text(shape);
         PyValueError::new_err(format!(
             "out: found {found}, wanted a writeable array of {dtype} of shape {wanted}, in C order"
@@ -313,13 +381,13 @@ pub fn output<'py, T: Element>(
             Ok(array) => format!("dtype {}", array.dtype().str()?),
             Err(_) => object.get_type().name()?.to_string(),
         };
-        return Err(wrong(found));
+        return Err(unfit(found));
     };
     if array.shape() != shape {
-        return Err(wrong(format!("shape {}", shape_text(array.shape()))));
+        return Err(unfit(format!("shape {}", shape_text(array.shape()))));
     }
     if !array.is_c_contiguous() {
-        return Err(wrong("another order".to_owned()));
+        return Err(unfit("another order".to_owned()));
     }
-    (array.try_readwrite()).map_err(|error| wrong(error.to_string()))
+    (array.try_readwrite()).map_err(|error| unfit(error.to_string()))
 }
