@@ -747,8 +747,8 @@ ANTUMBRA_API antumbra_status antumbra_intersect(const antumbra_bvh *bvh, const a
 
 /* Writes the closest hit of each ray that counts, with position and normal. Takes about 1.25 times as long as
  * antumbra_intersect(). */
-ANTUMBRA_API antumbra_status antumbra_surface_of(const antumbra_bvh *bvh, const antumbra_batch *batch, antumbra_surface *surfaces,
-                                                 size_t stride);
+ANTUMBRA_API antumbra_status antumbra_surface_of(const antumbra_bvh *bvh, const antumbra_batch *batch,
+                                                 antumbra_surface *surfaces, size_t stride);
 
 /* Writes any primitive that occludes each ray, not the closest one: see antumbra_occluder1(). Takes about 1.25 times as long as
  * antumbra_occluded(). */
@@ -810,7 +810,7 @@ ANTUMBRA_API void antumbra_hit_lists_free(antumbra_hit_lists *lists);
 typedef struct antumbra_directions antumbra_directions;
 
 /* Prepares directions of 3 floats, of any length. A direction that is zero, not finite or shorter than 3e-39 has the bit 0
-   for all points. */
+ * for all points. */
 ANTUMBRA_API antumbra_status antumbra_directions_new(const float *directions, size_t count, size_t stride,
                                                      antumbra_directions **prepared);
 
@@ -849,9 +849,9 @@ static inline antumbra_group antumbra_group_of(const float *points, size_t count
     return group;
 }
 
-/* Writes which rays nothing is in the way of: bit j % 64 of bits[i * words_per_row + j / 64] is that of point i and direction j.
+/* Writes which rays nothing is in the way of: bit j % 64 of bits[i * words_per_row + j / 64] is of point i and direction j.
  * Bits behind the last direction become 0. `words_per_row` must be (directions + 63) / 64, and `bits` a multiple of 8 bytes. Each
- * answer equals that of antumbra_occluded1(). */
+ * answer equals the answer of antumbra_occluded1(). */
 ANTUMBRA_API antumbra_status antumbra_group_open(const antumbra_bvh *bvh, const antumbra_group *group,
                                                  const antumbra_directions *directions, uint64_t *bits, size_t words_per_row);
 
@@ -946,7 +946,7 @@ ANTUMBRA_API void antumbra_closest_lists_free(antumbra_closest_lists *lists);
  * 11  Trees that change, and worlds
  * ------------------------------------------------------------------------------------------------------------------------ */
 
-/* Replaces the masks of all geometries of a tree: mask i is that of geometry i. Geometries behind the last mask have all bits.
+/* Replaces the masks of all geometries of a tree: mask i belongs to geometry i. Geometries behind the last mask have all bits.
  * Files do not hold masks, so loaded trees need them again.
  *
  * Errors: UNSUPPORTED if the tree has instances. */

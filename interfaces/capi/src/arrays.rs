@@ -1,7 +1,9 @@
 //! Memory of the caller: handles, arrays with strides, places for answers. All reading and writing of it is here.
 
+use std::borrow::Cow;
 use std::ffi::{CStr, c_char};
 use std::marker::PhantomData;
+use std::ops::Range;
 
 use crate::status::{Failure, Outcome};
 
@@ -79,13 +81,13 @@ pub unsafe fn exclusive<'a, T>(pointer: *mut T, name: &str) -> Outcome<&'a mut T
     Ok(unsafe { &mut *pointer })
 }
 
-/// Takes back a handle that [`Slot::give`] gave. Null is nothing.
+/// Takes back a handle that [`Handle::give`] gave. Null is nothing.
 ///
 /// # Safety
-/// If the pointer is not null, it must come from [`Slot::give`], and nobody may use it any more.
+/// If the pointer is not null, it must come from [`Handle::give`], and nobody may use it any more.
 pub unsafe fn take_back<T>(pointer: *mut T) {
     if !pointer.is_null() {
-        // SAFETY: made by `Box::into_raw` in `Slot::give`; not freed before by the caller's promise.
+        // SAFETY: made by `Box::into_raw` in `Handle::give`; not freed before by the caller's promise.
         drop(unsafe { Box::from_raw(pointer) });
     }
 }
@@ -101,39 +103,38 @@ impl<T: Copy> Slot<T> {
         Ok(Self(pointer))
     }
 
-    /// A place that may be missing.
-    ///
-    /// # Safety
-    /// As [`Slot::new`].
-    pub unsafe fn optional(pointer: *mut T, name: &str) -> Outcome<Option<Self>> {
-        if pointer.is_null() {
-            return Ok(None);
-        }
-        // SAFETY: the caller's promise.
-        unsafe { Self::new(pointer, name) }.map(Some)
-    }
-
     pub fn put(&self, value: T) {
         // SAFETY: not null and aligned by `new`, writable by the promise given there.
         unsafe { self.0.write(value) }
     }
 }
 
-impl<T> Slot<*mut T> {
-    /// A place for a handle, which is null from now on.
-    ///
+/// Place where a result goes that the caller need not take.
+pub struct MaybeSlot<T>(Option<Slot<T>>);
+
+impl<T: Copy> MaybeSlot<T> {
     /// # Safety
     /// As [`Slot::new`].
-    pub unsafe fn handle(pointer: *mut *mut T, name: &str) -> Outcome<Self> {
+    pub unsafe fn new(pointer: *mut T, name: &str) -> Outcome<Self> {
         // SAFETY: the caller's promise.
-        let slot = unsafe { Self::new(pointer, name) }?;
-        slot.put(std::ptr::null_mut());
-        Ok(slot)
+        let slot = (!pointer.is_null()).then(|| unsafe { Slot::new(pointer, name) });
+        Ok(Self(slot.transpose()?))
     }
 
+    pub fn put(&self, value: T) {
+        if let Some(slot) = &self.0 {
+            slot.put(value);
+        }
+    }
+}
+
+/// Place where a handle goes, which is null until then.
+pub struct Handle<T>(pub Slot<*mut T>);
+
+impl<T> Handle<T> {
     /// Gives a handle to the caller, who frees it.
     pub fn give(&self, value: T) {
-        self.put(Box::into_raw(Box::new(value)));
+        self.0.put(Box::into_raw(Box::new(value)));
     }
 }
 
@@ -257,6 +258,19 @@ impl<'a, T: Plain> Items<'a, T> {
     /// All items.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = T> + '_ {
         (0..self.count).map(|index| self.get(index))
+    }
+
+    /// Some of the items as a list: where they are, or copied.
+    pub fn some(&self, range: Range<usize>) -> Cow<'a, [T]> {
+        match self.as_slice() {
+            Some(items) => Cow::Borrowed(&items[range]),
+            None => Cow::Owned(range.map(|index| self.get(index)).collect()),
+        }
+    }
+
+    /// All items as a list: where they are, or copied.
+    pub fn all(&self) -> Cow<'a, [T]> {
+        self.some(0..self.count)
     }
 
     /// All items as a list, copied.

@@ -1,6 +1,5 @@
 //! Batches: many rays with conditions, as the caller stores them, in pieces.
 
-use std::borrow::Cow;
 use std::ffi::c_void;
 use std::ops::Range;
 use std::ptr::{null, null_mut};
@@ -173,6 +172,7 @@ impl<'a> Rays<'a> {
             let text = "`tnear` and `tfar` belong to `origins` and `directions`: structures have their own";
             return Err(Failure::argument(text));
         }
+        let flags = checked_flags(batch.flags, CLOSED | THIS_THREAD, "batch->flags")?;
         // SAFETY: as above, for the arrays of the structure.
         let (source, masks, except, place) = unsafe {
             let source = if is_columns {
@@ -195,10 +195,9 @@ impl<'a> Rays<'a> {
                 source,
                 Items::optional(batch.masks, count, batch.mask_stride, "masks")?,
                 Items::optional(batch.except, count, batch.except_stride, "except")?,
-                Place::of(batch.threads)?,
+                Place::flagged(batch.threads, flags)?,
             )
         };
-        let flags = checked_flags(batch.flags, CLOSED | THIS_THREAD, "batch->flags")?;
         let order = match batch.order {
             0 => RayOrder::AsGiven,
             1 => RayOrder::Alike,
@@ -218,11 +217,7 @@ impl<'a> Rays<'a> {
             filter,
             is_closed: flags & CLOSED != 0,
             order,
-            place: if flags & THIS_THREAD != 0 {
-                Place::Here
-            } else {
-                place
-            },
+            place,
         })
     }
 
@@ -249,6 +244,12 @@ impl<'a> Rays<'a> {
             .masks
             .is_none_or(|masks| masks.is_same() || masks.as_slice().is_some());
         rays && masks && self.except.is_none_or(|except| except.as_slice().is_some())
+    }
+
+    /// Runs `query` on all rays as one batch of the kernel.
+    pub fn whole<R>(&self, bvh: &Bvh, query: impl FnOnce(Batch<'_>) -> R) -> R {
+        let is_shared = !self.place.is_here();
+        self.with(bvh, 0..self.count, is_shared, &mut Vec::new(), query)
     }
 
     /// Runs `query` on some of the rays as a batch of the kernel, on the calling thread or, if it may, on the threads of the
@@ -281,8 +282,8 @@ impl<'a> Rays<'a> {
             batch = batch.closed();
         }
         let masks = self.masks.filter(|masks| !masks.is_same());
-        let masks = masks.map(|masks| some(&masks, range.clone()));
-        let except = self.except.map(|except| some(&except, range.clone()));
+        let masks = masks.map(|masks| masks.some(range.clone()));
+        let except = self.except.map(|except| except.some(range.clone()));
         if let Some(masks) = &masks {
             batch = batch.masks(masks);
         } else if let Some(masks) = self.masks.filter(|masks| masks.count() > 0) {
@@ -301,13 +302,5 @@ impl<'a> Rays<'a> {
             batch = batch.filter(&accepts);
         }
         query(batch)
-    }
-}
-
-/// Some of the items as a list: where they are, or copied.
-fn some<'a, T: crate::arrays::Plain>(items: &Items<'a, T>, range: Range<usize>) -> Cow<'a, [T]> {
-    match items.as_slice() {
-        Some(items) => Cow::Borrowed(&items[range]),
-        None => Cow::Owned(range.map(|index| items.get(index)).collect()),
     }
 }

@@ -6,10 +6,11 @@ use std::ffi::c_void;
 use antumbra::inputs::Source;
 use antumbra::{Build, BuildMonitor, Bvh, Error, Masks, Object, Primitives, Ray, Recipe};
 
-use crate::arrays::{Items, Slot, Versioned, handles, optional, shared, sized, take_back};
+use crate::arrays::{Handle, Items, Slot, Versioned, handles, sized};
+use crate::interface::{frees, functions};
 use crate::recipe::RecipeChoices;
 use crate::scene::Scene;
-use crate::status::{Outcome, Status, guarded};
+use crate::status::Outcome;
 use crate::threads::{Place, Threads};
 use crate::world::{Placed, has_masks, instances_of};
 
@@ -72,13 +73,8 @@ impl BuildMonitor for Monitor {
     }
 }
 
-/// Rays of the caller as a list: where they are, or copied.
-pub fn list<'a>(rays: &Items<'a, Ray>) -> Cow<'a, [Ray]> {
-    (rays.as_slice()).map_or_else(|| Cow::Owned(rays.to_vec()), Cow::Borrowed)
-}
-
 /// Options of a build, checked.
-struct Prepared<'a> {
+pub struct Prepared<'a> {
     recipe: Recipe,
     rays: Cow<'a, [Ray]>,
     monitor: Monitor,
@@ -90,7 +86,7 @@ impl<'a> Prepared<'a> {
     ///
     /// # Safety
     /// If the pointer is not null, it is of a structure as the header says.
-    unsafe fn new(options: *const BuildOptions) -> Outcome<Self> {
+    pub unsafe fn new(options: *const BuildOptions) -> Outcome<Self> {
         let options = match options.is_null() {
             true => NOTHING_SAID,
             // SAFETY: the caller's promise.
@@ -110,7 +106,7 @@ impl<'a> Prepared<'a> {
         };
         Ok(Self {
             recipe,
-            rays: list(&rays),
+            rays: rays.all(),
             monitor,
             place,
         })
@@ -130,118 +126,90 @@ impl<'a> Prepared<'a> {
     }
 }
 
-/// Builds a tree over a scene.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_bvh_build(
-    scene: *const Scene,
-    options: *const BuildOptions,
-    bvh: *mut *mut Bvh,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (scene, options, slot) = unsafe {
-            let slot = Slot::handle(bvh, "bvh")?;
-            (shared(scene, "scene")?, Prepared::new(options)?, slot)
-        };
-        let geometries = scene.geometries();
-        let mut bvh = options.run((&geometries).into(), Build::bvh)?;
-        let masks = scene.masks();
-        if !masks.is_empty() {
-            bvh.set_masks(Masks::new().world(masks));
-        }
-        slot.give(bvh);
-        Ok(())
-    })
-}
-
-/// Builds a tree over a ground, objects and their instances, none of which moves.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_bvh_build_instances(
-    ground: *const Scene,
-    objects: *const *const Scene,
-    object_count: usize,
-    instances: *const Placed,
-    instance_count: usize,
-    options: *const BuildOptions,
-    bvh: *mut *mut Bvh,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (slot, ground, objects, instances, options) = unsafe {
-            let slot = Slot::handle(bvh, "bvh")?;
-            let instances = Items::new(instances, instance_count, 0, "instances")?;
-            let objects = handles(objects, object_count, "objects")?;
-            let ground = optional(ground, "ground")?;
-            (slot, ground, objects, instances, Prepared::new(options)?)
-        };
-        let geometries = ground.map(Scene::geometries).unwrap_or_default();
-        let of_objects: Vec<_> = objects.iter().map(|scene| scene.geometries()).collect();
-        let (placed, instance_masks) = instances_of(&instances)?;
-        let primitives = Primitives::with_instances(&geometries, &of_objects, &placed)?;
-        let mut bvh = options.run((&primitives).into(), Build::bvh)?;
-        let masks = Masks::new()
-            .world(ground.map(Scene::masks).unwrap_or_default())
-            .objects(objects.iter().map(|scene| scene.masks()).collect())
-            .instances(instance_masks);
-        if has_masks(&masks) {
-            bvh.set_masks(masks);
-        }
-        slot.give(bvh);
-        Ok(())
-    })
-}
-
 /// An object and the masks of its geometries, `antumbra_object`.
 pub struct OwnObject {
     pub object: Object,
     pub masks: Vec<u32>,
 }
 
-/// Builds an object over a scene.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_object_build(
-    scene: *const Scene,
-    options: *const BuildOptions,
-    object: *mut *mut OwnObject,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (scene, options, slot) = unsafe {
-            let slot = Slot::handle(object, "object")?;
-            (shared(scene, "scene")?, Prepared::new(options)?, slot)
-        };
+impl OwnObject {
+    /// An object whose geometries have all bits.
+    pub fn new(object: Object) -> Self {
+        let masks = Vec::new();
+        Self { object, masks }
+    }
+}
+
+functions! {
+    /// Builds a tree over a scene. An empty scene is fine. `options` may be NULL.
+    ///
+    /// Errors: INVALID_ARGUMENT, BAD_GEOMETRY, TOO_MANY, NO_MEMORY, CANCELLED.
+    fn antumbra_bvh_build(scene: &Scene, options: Prepared<'_>, bvh: Handle<Bvh>) {
         let geometries = scene.geometries();
-        let object = options.run((&geometries).into(), Build::object)?;
+        let mut built = options.run((&geometries).into(), Build::bvh)?;
         let masks = scene.masks();
-        slot.give(OwnObject { object, masks });
+        if !masks.is_empty() {
+            built.set_masks(Masks::new().world(masks));
+        }
+        bvh.give(built);
         Ok(())
-    })
-}
+    }
 
-/// Frees a tree.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_bvh_free(bvh: *mut Bvh) {
-    // SAFETY: the header says that a handle is freed once.
-    unsafe { take_back(bvh) }
-}
-
-/// Frees an object.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_object_free(object: *mut OwnObject) {
-    // SAFETY: the header says that a handle is freed once.
-    unsafe { take_back(object) }
-}
-
-/// The tree of an object.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_object_bvh(
-    object: *const OwnObject,
-    bvh: *mut *const Bvh,
-) -> Status {
-    guarded(|| {
+    /// Builds one tree over a ground, objects and their instances, none of which will move. Learns all levels together, so it
+    /// answers faster than a world, and takes longer to build. `ground` may be NULL. Hits of instance i have the inst_id i.
+    ///
+    /// Errors: as antumbra_bvh_build(); BAD_GEOMETRY if an instance names an object that is not there.
+    fn antumbra_bvh_build_instances(
+        ground: Option<&Scene>,
+        objects: *const *const Scene,
+        object_count: usize,
+        instances: *const Placed,
+        instance_count: usize,
+        options: Prepared<'_>,
+        bvh: Handle<Bvh>,
+    ) {
         // SAFETY: the header says what is at these addresses.
-        let (object, slot) = unsafe { (shared(object, "object")?, Slot::new(bvh, "bvh")?) };
-        slot.put(std::ptr::from_ref::<Bvh>(&object.object));
+        let (objects, instances) = unsafe {
+            let objects = handles(objects, object_count, "objects")?;
+            (objects, Items::new(instances, instance_count, 0, "instances")?)
+        };
+        let geometries = ground.map(Scene::geometries).unwrap_or_default();
+        let of_objects: Vec<_> = objects.iter().map(|scene| scene.geometries()).collect();
+        let (placed, instance_masks) = instances_of(&instances)?;
+        let primitives = Primitives::with_instances(&geometries, &of_objects, &placed)?;
+        let mut built = options.run((&primitives).into(), Build::bvh)?;
+        let masks = Masks::new()
+            .world(ground.map(Scene::masks).unwrap_or_default())
+            .objects(objects.iter().map(|scene| scene.masks()).collect())
+            .instances(instance_masks);
+        if has_masks(&masks) {
+            built.set_masks(masks);
+        }
+        bvh.give(built);
         Ok(())
-    })
+    }
+
+    /// Builds an object. `options` may be NULL. Errors: as antumbra_bvh_build().
+    fn antumbra_object_build(scene: &Scene, options: Prepared<'_>, object: Handle<OwnObject>) {
+        let geometries = scene.geometries();
+        let (built, masks) = (options.run((&geometries).into(), Build::object)?, scene.masks());
+        object.give(OwnObject {
+            object: built,
+            masks,
+        });
+        Ok(())
+    }
+
+    /// Lends the tree of an object, in its own space and without masks. It lives as long as the object, and is not freed.
+    fn antumbra_object_bvh(object: &OwnObject, bvh: Slot<*const Bvh>) {
+        bvh.put(std::ptr::from_ref::<Bvh>(&object.object));
+        Ok(())
+    }
+}
+
+frees! {
+    /// Frees a tree. Not for trees that antumbra_world_bvh() or antumbra_object_bvh() lent.
+    fn antumbra_bvh_free(bvh: Bvh);
+    /// Frees an object. Worlds that it joined keep what they have.
+    fn antumbra_object_free(object: OwnObject);
 }

@@ -4,9 +4,10 @@ use std::borrow::Cow;
 
 use antumbra::{Bvh, Directions};
 
-use crate::arrays::{Answers, Items, Plain, Slot, Versioned, shared, sized, take_back};
+use crate::arrays::{Answers, Handle, Items, Versioned, sized};
 use crate::batch::{THIS_THREAD, checked_flags};
-use crate::status::{Failure, Outcome, Status, guarded};
+use crate::interface::{frees, functions};
+use crate::status::{Failure, Outcome, Status};
 use crate::threads::{Place, Threads};
 
 /// Points that look in directions, `antumbra_group`.
@@ -31,45 +32,8 @@ unsafe impl Versioned for GroupOptions {
     const NAME: &'static str = "antumbra_group";
 }
 
-/// Items as a list: where they are, or copied.
-pub fn all<'a, T: Plain>(items: &Items<'a, T>) -> Cow<'a, [T]> {
-    (items.as_slice()).map_or_else(|| Cow::Owned(items.to_vec()), Cow::Borrowed)
-}
-
-/// Prepares directions.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_directions_new(
-    directions: *const f32,
-    count: usize,
-    stride: usize,
-    prepared: *mut *mut Directions,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (slot, directions) = unsafe {
-            let slot = Slot::handle(prepared, "prepared")?;
-            (
-                slot,
-                Items::<[f32; 3]>::new(directions.cast(), count, stride, "directions")?,
-            )
-        };
-        if u32::try_from(count).is_err() {
-            return Err(Failure::new(Status::TooMany, "more than 2^32 directions"));
-        }
-        slot.give(Directions::new(&all(&directions)));
-        Ok(())
-    })
-}
-
-/// Frees directions.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_directions_free(directions: *mut Directions) {
-    // SAFETY: the header says that a handle is freed once.
-    unsafe { take_back(directions) }
-}
-
 /// Points of a group, checked.
-struct Points<'a> {
+pub struct Points<'a> {
     points: Cow<'a, [[f32; 3]]>,
     normals: Option<Cow<'a, [[f32; 3]]>>,
     tnear: Option<Cow<'a, [f32]>>,
@@ -77,10 +41,10 @@ struct Points<'a> {
     place: Place<'a>,
 }
 
-impl Points<'_> {
+impl<'a> Points<'a> {
     /// # Safety
     /// If the pointer is not null, it is of a structure as the header says.
-    unsafe fn new(group: *const GroupOptions) -> Outcome<Self> {
+    pub unsafe fn new(group: *const GroupOptions) -> Outcome<Self> {
         // SAFETY: the caller's promise.
         let group = unsafe { sized(group, "group") }?;
         let GroupOptions { count, tfar, .. } = group;
@@ -92,38 +56,47 @@ impl Points<'_> {
                 Items::new(points, count, group.point_stride, "points")?,
                 Items::optional(normals, count, group.normal_stride, "normals")?,
                 Items::optional(group.tnear, count, group.tnear_stride, "tnear")?,
-                Place::of(group.threads)?,
+                Place::flagged(group.threads, flags)?,
             )
         };
         Ok(Self {
-            points: all(&points),
-            normals: normals.map(|normals| all(&normals)),
-            tnear: tnear.map(|tnear| all(&tnear)),
+            points: points.all(),
+            normals: normals.map(|normals| normals.all()),
+            tnear: tnear.map(|tnear| tnear.all()),
             tfar,
-            place: if flags & THIS_THREAD != 0 {
-                Place::Here
-            } else {
-                place
-            },
+            place,
         })
     }
 }
 
-/// Returns which rays nothing is in the way of, a row of bits for each point.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_group_open(
-    bvh: *const Bvh,
-    group: *const GroupOptions,
-    directions: *const Directions,
-    bits: *mut u64,
-    words_per_row: usize,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (bvh, group, directions) = unsafe {
-            let directions = shared(directions, "directions")?;
-            (shared(bvh, "bvh")?, Points::new(group)?, directions)
-        };
+functions! {
+    /// Prepares directions of 3 floats, of any length. A direction that is zero, not finite or shorter than 3e-39 has the bit 0
+    /// for all points.
+    fn antumbra_directions_new(
+        directions: *const f32,
+        count: usize,
+        stride: usize,
+        prepared: Handle<Directions>,
+    ) {
+        // SAFETY: the header says what is at this address.
+        let directions = unsafe { Items::new(directions.cast(), count, stride, "directions") }?;
+        if u32::try_from(count).is_err() {
+            return Err(Failure::new(Status::TooMany, "more than 2^32 directions"));
+        }
+        prepared.give(Directions::new(&directions.all()));
+        Ok(())
+    }
+
+    /// Writes which rays nothing is in the way of: bit j % 64 of bits[i * words_per_row + j / 64] is of point i and direction j.
+    /// Bits behind the last direction become 0. `words_per_row` must be (directions + 63) / 64, and `bits` a multiple of 8 bytes. Each
+    /// answer equals the answer of antumbra_occluded1().
+    fn antumbra_group_open(
+        bvh: &Bvh,
+        group: Points<'_>,
+        directions: &Directions,
+        bits: *mut u64,
+        words_per_row: usize,
+    ) {
         let needed = directions.len().div_ceil(64);
         if words_per_row != needed {
             return Err(Failure::argument(format_args!(
@@ -134,7 +107,7 @@ pub unsafe extern "C" fn antumbra_group_open(
         let Some(words) = group.points.len().checked_mul(needed) else {
             return Err(Failure::argument("more rays than any memory has bits for"));
         };
-        // SAFETY: as above.
+        // SAFETY: the header says what is at this address.
         let bits = unsafe { Answers::new(bits, words, 0, "bits") }?.into_words("bits")?;
         let mut rays = bvh.group(&group.points, directions).far(group.tfar);
         if let Some(normals) = &group.normals {
@@ -149,5 +122,10 @@ pub unsafe extern "C" fn antumbra_group_open(
             group.place.run(|| rays.open_into(bits));
         }
         Ok(())
-    })
+    }
+}
+
+frees! {
+    /// Frees directions.
+    fn antumbra_directions_free(directions: Directions);
 }

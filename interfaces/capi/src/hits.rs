@@ -5,11 +5,12 @@ use std::sync::atomic::{AtomicI32, Ordering};
 
 use antumbra::{Bvh, Hit, HitLists, Ray, Visit};
 
-use crate::arrays::{Answers, Slot, shared, take_back};
-use crate::batch::{BatchOptions, PIECE, Rays};
-use crate::status::{Failure, Status, guarded, if_no_memory};
+use crate::arrays::{Answers, Handle, MaybeSlot};
+use crate::batch::{PIECE, Rays};
+use crate::interface::{frees, functions};
+use crate::status::{Failure, if_no_memory};
 
-type OnHit = extern "C" fn(*mut c_void, usize, *const Hit) -> i32;
+pub type OnHit = extern "C" fn(*mut c_void, usize, *const Hit) -> i32;
 
 /// A visitor with its data.
 struct Visitor {
@@ -36,136 +37,80 @@ impl Visitor {
     }
 }
 
-/// Calls a function with the hits of each ray, front to back.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_visit_hits(
-    bvh: *const Bvh,
-    batch: *const BatchOptions,
-    visit: Option<OnHit>,
-    data: *mut c_void,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (bvh, rays) = unsafe { (shared(bvh, "bvh")?, Rays::new(batch)?) };
-        let Some(visit) = visit else {
-            return Err(Failure::argument("`visit` is null"));
-        };
+functions! {
+    /// Calls `visit` with the hits of each ray that count, front to back, until it returns something else than ANTUMBRA_REJECT.
+    /// `ray` is the number of the ray in the batch. Calls for one ray come one after another; different rays may be on different
+    /// threads. For shadow rays through glass, and whatever accumulates along a ray.
+    ///
+    /// Errors: INVALID_ARGUMENT, also if `visit` returns an unknown number, which ends the ray.
+    fn antumbra_visit_hits(
+        bvh: &Bvh,
+        batch: Rays<'_>,
+        visit: Option<OnHit>,
+        data: *mut c_void,
+    ) {
+        let visit = visit.ok_or_else(|| Failure::argument("`visit` is null"))?;
         let wrong = AtomicI32::new(0);
         let visitor = Visitor { data, visit, wrong };
         let visitor = &visitor;
-        rays.place().in_pieces(
-            rays.count(),
-            PIECE,
-            |memory: &mut (Vec<Ray>, Vec<usize>), range| {
-                let (gathered, states) = memory;
-                states.clear();
-                states.extend(range.clone());
-                rays.with(bvh, range, false, gathered, |batch| {
-                    batch.visit_hits(states, |ray, hit| visitor.visit(*ray, &hit));
-                });
-            },
-        );
+        let visit = |memory: &mut (Vec<Ray>, Vec<usize>), range: std::ops::Range<usize>| {
+            let (gathered, states) = memory;
+            states.clear();
+            states.extend(range.clone());
+            batch.with(bvh, range, false, gathered, |rays| {
+                rays.visit_hits(states, |ray, hit| visitor.visit(*ray, &hit));
+            });
+        };
+        batch.place().in_pieces(batch.count(), PIECE, visit);
         match visitor.wrong.load(Ordering::Relaxed) {
             0 => Ok(()),
             wrong => Err(Failure::argument(format_args!(
                 "`visit` returned {wrong}, which is neither ANTUMBRA_REJECT nor ANTUMBRA_ACCEPT nor ANTUMBRA_STOP"
             ))),
         }
-    })
-}
+    }
 
-/// Counts the hits of each ray.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_count_hits(
-    bvh: *const Bvh,
-    batch: *const BatchOptions,
-    counts: *mut u32,
-    stride: usize,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (bvh, rays, answers) = unsafe {
-            let rays = Rays::new(batch)?;
-            let answers = Answers::new(counts, rays.count(), stride, "counts")?;
-            (shared(bvh, "bvh")?, rays, answers)
-        };
-        rays.place()
-            .in_pieces(rays.count(), PIECE / 4, |gathered, range| {
-                let first = range.start;
-                let counts = rays.with(bvh, range, false, gathered, |batch| batch.count_hits());
-                for (index, count) in counts.into_iter().enumerate() {
-                    answers.set(first + index, count);
-                }
-            });
-        Ok(())
-    })
-}
-
-/// Lists the hits of each ray.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_all_hits(
-    bvh: *const Bvh,
-    batch: *const BatchOptions,
-    lists: *mut *mut HitLists,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (bvh, rays, slot) = unsafe {
-            let slot = Slot::handle(lists, "lists")?;
-            (shared(bvh, "bvh")?, Rays::new(batch)?, slot)
-        };
-        // A hit for each ray, and where its list ends.
-        if_no_memory(
-            rays.count(),
-            size_of::<Hit>() + size_of::<usize>(),
-            "lists of hits",
-        )?;
-        let place = rays.place();
-        let lists = place.run(|| {
-            let range = 0..rays.count();
-            rays.with(bvh, range, !place.is_here(), &mut Vec::new(), |batch| {
-                batch.all_hits()
-            })
+    /// Writes the number of hits of each ray that count.
+    fn antumbra_count_hits(bvh: &Bvh, batch: Rays<'_>, counts: *mut u32, stride: usize) {
+        // SAFETY: the header says what is at this address.
+        let answers = unsafe { Answers::new(counts, batch.count(), stride, "counts") }?;
+        let place = batch.place();
+        place.in_pieces(batch.count(), PIECE / 4, |gathered, range| {
+            let first = range.start;
+            let counts = batch.with(bvh, range, false, gathered, |rays| rays.count_hits());
+            for (index, count) in counts.into_iter().enumerate() {
+                answers.set(first + index, count);
+            }
         });
-        slot.give(lists);
         Ok(())
-    })
+    }
+
+    /// Lists all hits of each ray that count.
+    fn antumbra_all_hits(bvh: &Bvh, batch: Rays<'_>, lists: Handle<HitLists>) {
+        // A hit for each ray, and where its list ends.
+        let each = size_of::<Hit>() + size_of::<usize>();
+        if_no_memory(batch.count(), each, "lists of hits")?;
+        let found = batch.place().run(|| batch.whole(bvh, |rays| rays.all_hits()));
+        lists.give(found);
+        Ok(())
+    }
+
+    /// Lends the arrays: hits of ray i are hits[splits[i]] to hits[splits[i + 1] - 1]. `splits` has one number more than there are
+    /// rays, the last is `hit_count`. The arrays live as long as the lists. Each of the three may be NULL.
+    fn antumbra_hit_lists_get(
+        lists: &HitLists,
+        splits: MaybeSlot<*const usize>,
+        hits: MaybeSlot<*const Hit>,
+        hit_count: MaybeSlot<usize>,
+    ) {
+        splits.put(lists.splits.as_ptr());
+        hits.put(lists.hits.as_ptr());
+        hit_count.put(lists.hits.len());
+        Ok(())
+    }
 }
 
-/// Returns the arrays of lists of hits.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_hit_lists_get(
-    lists: *const HitLists,
-    splits: *mut *const usize,
-    hits: *mut *const Hit,
-    hit_count: *mut usize,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (lists, splits, hits, hit_count) = unsafe {
-            (
-                shared(lists, "lists")?,
-                Slot::optional(splits, "splits")?,
-                Slot::optional(hits, "hits")?,
-                Slot::optional(hit_count, "hit_count")?,
-            )
-        };
-        if let Some(splits) = splits {
-            splits.put(lists.splits.as_ptr());
-        }
-        if let Some(hits) = hits {
-            hits.put(lists.hits.as_ptr());
-        }
-        if let Some(hit_count) = hit_count {
-            hit_count.put(lists.hits.len());
-        }
-        Ok(())
-    })
-}
-
-/// Frees lists of hits.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_hit_lists_free(lists: *mut HitLists) {
-    // SAFETY: the header says that a handle is freed once.
-    unsafe { take_back(lists) }
+frees! {
+    /// Frees lists of hits.
+    fn antumbra_hit_lists_free(lists: HitLists);
 }

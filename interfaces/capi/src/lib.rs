@@ -4,6 +4,7 @@
 //! the manual: it says what callers promise, and each `SAFETY` comment that mentions it refers to these promises.
 //!
 //! - `status`: codes, the text of the last error, panics;  `arrays`: memory of the caller
+//! - `interface`: the form of all functions, and their list for the header
 //! - `threads`: pools of threads, and work shared among them
 //! - `scene`: lists of geometries;  `meshes`: triangles and quads;  `functions`: user geometry and opacities
 //! - `recipe`: choices of a build;  `build`: trees and objects;  `tree`: what they are, refit
@@ -27,6 +28,7 @@ pub mod build;
 pub mod functions;
 pub mod groups;
 pub mod hits;
+mod interface;
 pub mod learning;
 pub mod meshes;
 pub mod points;

@@ -1,8 +1,9 @@
 //! Meshes of triangles and quads in scenes: corners, vertices in single and double precision.
 
-use crate::arrays::{Items, Plain, Slot, exclusive};
+use crate::arrays::{Items, MaybeSlot, Plain};
+use crate::interface::functions;
 use crate::scene::{Part, Scene};
-use crate::status::{Failure, Outcome, Status, guarded};
+use crate::status::{Failure, Outcome, Status};
 
 /// Corners of the primitives of a mesh: those given, or all vertices in their order.
 ///
@@ -33,38 +34,6 @@ where
         .collect())
 }
 
-/// A mesh of the caller becomes a part of a scene.
-macro_rules! add_mesh {
-    ($name:ident, $doc:literal, $Float:ty, $corners:literal, $variant:ident { $($more:tt)* }) => {
-        #[doc = $doc]
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(
-            scene: *mut Scene,
-            positions: *const $Float,
-            position_count: usize,
-            position_stride: usize,
-            indices: *const u32,
-            count: usize,
-            index_stride: usize,
-            geom_id: *mut u32,
-        ) -> Status {
-            guarded(|| {
-                // SAFETY: the header says what is at these addresses.
-                let (scene, positions, geom_id) = unsafe {
-                    let positions =
-                        Items::<[$Float; 3]>::new(positions.cast(), position_count, position_stride, "positions")?;
-                    (exclusive(scene, "scene")?, positions, Slot::optional(geom_id, "geom_id")?)
-                };
-                let indices = (indices, count, index_stride);
-                // SAFETY: as above.
-                let indices = unsafe { corners::<$corners>(position_count, indices) }?;
-                let positions = <$Float as Coordinate>::positions(scene, &positions);
-                scene.add(Part::$variant { positions, indices, $($more)* }, geom_id)
-            })
-        }
-    };
-}
-
 /// Number of which points are made.
 trait Coordinate: Sized {
     fn positions(scene: &Scene, points: &Items<'_, [Self; 3]>) -> Vec<[f32; 3]>;
@@ -82,80 +51,155 @@ impl Coordinate for f64 {
     }
 }
 
-add_mesh!(
-    antumbra_scene_add_triangles,
-    "Adds a triangle mesh.",
-    f32,
-    3,
-    Triangles { opacity: None }
-);
-add_mesh!(
-    antumbra_scene_add_triangles_f64,
-    "Adds a triangle mesh in double precision.",
-    f64,
-    3,
-    Triangles { opacity: None }
-);
-add_mesh!(
-    antumbra_scene_add_quads,
-    "Adds a mesh of quads.",
-    f32,
-    4,
-    Quads {}
-);
-add_mesh!(
-    antumbra_scene_add_quads_f64,
-    "Adds a mesh of quads in double precision.",
-    f64,
-    4,
-    Quads {}
-);
-
-/// Replaces the vertices of a mesh.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_scene_set_positions(
-    scene: *mut Scene,
-    geom_id: u32,
-    positions: *const f32,
-    position_count: usize,
-    position_stride: usize,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (scene, positions) = unsafe {
-            let positions = Items::<[f32; 3]>::new(
-                positions.cast(),
-                position_count,
-                position_stride,
-                "positions",
-            )?;
-            (exclusive(scene, "scene")?, positions)
-        };
-        scene.set_positions(geom_id, positions.to_vec())
-    })
+/// Points around the origin of a scene, of an address, a count and a stride.
+///
+/// # Safety
+/// As of [`Items::new`].
+unsafe fn points<T: Coordinate>(
+    scene: &Scene,
+    (points, count, stride): (*const T, usize, usize),
+) -> Outcome<Vec<[f32; 3]>>
+where
+    [T; 3]: Plain,
+{
+    // SAFETY: the caller's promise.
+    let points = unsafe { Items::new(points.cast(), count, stride, "positions") }?;
+    Ok(T::positions(scene, &points))
 }
 
-/// Replaces the vertices of a mesh by others in double precision.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_scene_set_positions_f64(
-    scene: *mut Scene,
-    geom_id: u32,
-    positions: *const f64,
-    position_count: usize,
-    position_stride: usize,
-) -> Status {
-    guarded(|| {
+/// Points, and primitives of `N` corners.
+type Mesh<const N: usize> = (Vec<[f32; 3]>, Vec<[u32; N]>);
+
+/// Points and corners of a mesh.
+///
+/// # Safety
+/// As of [`Items::new`].
+unsafe fn mesh<T: Coordinate, const N: usize>(
+    scene: &Scene,
+    positions: (*const T, usize, usize),
+    indices: (*const u32, usize, usize),
+) -> Outcome<Mesh<N>>
+where
+    [T; 3]: Plain,
+    [u32; N]: Plain,
+{
+    // SAFETY: the caller's promise.
+    unsafe { Ok((points(scene, positions)?, corners(positions.1, indices)?)) }
+}
+
+functions! {
+    /// Adds a triangle mesh.
+    ///
+    /// `positions` has `position_count` points of 3 floats, `indices` has `triangle_count` times 3 indices of points. Without
+    /// indices (NULL) every 3 points are a triangle, and triangle_count must be position_count / 3. `geom_id` may be NULL. Indices
+    /// are checked at build.
+    ///
+    /// Errors: INVALID_ARGUMENT, TOO_MANY.
+    fn antumbra_scene_add_triangles(
+        scene: &mut Scene,
+        positions: *const f32,
+        position_count: usize,
+        position_stride: usize,
+        indices: *const u32,
+        triangle_count: usize,
+        index_stride: usize,
+        geom_id: MaybeSlot<u32>,
+    ) {
         // SAFETY: the header says what is at these addresses.
-        let (scene, positions) = unsafe {
-            let positions = Items::<[f64; 3]>::new(
-                positions.cast(),
-                position_count,
-                position_stride,
-                "positions",
-            )?;
-            (exclusive(scene, "scene")?, positions)
-        };
-        let moved = scene.local(&positions);
-        scene.set_positions(geom_id, moved)
-    })
+        let (positions, indices) = unsafe {
+            let positions = (positions, position_count, position_stride);
+            mesh(scene, positions, (indices, triangle_count, index_stride))
+        }?;
+        scene.add(Part::triangles(positions, indices), &geom_id)
+    }
+
+    /// antumbra_scene_add_triangles() with points of 3 doubles, from which the origin of the scene is subtracted.
+    fn antumbra_scene_add_triangles_f64(
+        scene: &mut Scene,
+        positions: *const f64,
+        position_count: usize,
+        position_stride: usize,
+        indices: *const u32,
+        triangle_count: usize,
+        index_stride: usize,
+        geom_id: MaybeSlot<u32>,
+    ) {
+        // SAFETY: the header says what is at these addresses.
+        let (positions, indices) = unsafe {
+            let positions = (positions, position_count, position_stride);
+            mesh(scene, positions, (indices, triangle_count, index_stride))
+        }?;
+        scene.add(Part::triangles(positions, indices), &geom_id)
+    }
+
+    /// Adds a mesh of quads: as antumbra_scene_add_triangles() with 4 indices each.
+    ///
+    /// A quad with the corners 0, 1, 2, 3 is the two triangles (0, 1, 3) and (2, 3, 1), which have one prim_id and fit without a
+    /// gap. The corners need not be in one plane. If the third index equals the fourth, only the first triangle is there.
+    fn antumbra_scene_add_quads(
+        scene: &mut Scene,
+        positions: *const f32,
+        position_count: usize,
+        position_stride: usize,
+        indices: *const u32,
+        quad_count: usize,
+        index_stride: usize,
+        geom_id: MaybeSlot<u32>,
+    ) {
+        // SAFETY: the header says what is at these addresses.
+        let (positions, indices) = unsafe {
+            let positions = (positions, position_count, position_stride);
+            mesh(scene, positions, (indices, quad_count, index_stride))
+        }?;
+        scene.add(Part::Quads { positions, indices }, &geom_id)
+    }
+
+    /// antumbra_scene_add_quads() with points of 3 doubles, from which the origin of the scene is subtracted.
+    fn antumbra_scene_add_quads_f64(
+        scene: &mut Scene,
+        positions: *const f64,
+        position_count: usize,
+        position_stride: usize,
+        indices: *const u32,
+        quad_count: usize,
+        index_stride: usize,
+        geom_id: MaybeSlot<u32>,
+    ) {
+        // SAFETY: the header says what is at these addresses.
+        let (positions, indices) = unsafe {
+            let positions = (positions, position_count, position_stride);
+            mesh(scene, positions, (indices, quad_count, index_stride))
+        }?;
+        scene.add(Part::Quads { positions, indices }, &geom_id)
+    }
+
+    /// Replaces the positions of a mesh of triangles or quads by as many others, for a refit.
+    ///
+    /// Errors: INVALID_ARGUMENT if there are more or fewer; UNSUPPORTED if the geometry has no vertices.
+    fn antumbra_scene_set_positions(
+        scene: &mut Scene,
+        geom_id: u32,
+        positions: *const f32,
+        position_count: usize,
+        position_stride: usize,
+    ) {
+        let given = (positions, position_count, position_stride);
+        // SAFETY: the header says what is at these addresses.
+        let positions = unsafe { points(scene, given) }?;
+        scene.set_positions(geom_id, positions)
+    }
+
+    /// antumbra_scene_set_positions() with points of 3 doubles, from which the origin of the scene is subtracted.
+    fn antumbra_scene_set_positions_f64(
+        scene: &mut Scene,
+        geom_id: u32,
+        positions: *const f64,
+        position_count: usize,
+        position_stride: usize,
+    ) {
+        let given = (positions, position_count, position_stride);
+        // SAFETY: the header says what is at these addresses.
+        let positions = unsafe { points(scene, given) }?;
+        scene.set_positions(geom_id, positions)
+    }
 }

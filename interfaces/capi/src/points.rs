@@ -1,10 +1,14 @@
 //! Queries about points: what is nearest, what is within a distance, what is inside, and how deep.
 
+use std::sync::{Mutex, PoisonError};
+
 use antumbra::{Bvh, INVALID_ID};
 
-use crate::arrays::{Answers, Items, Slot, Versioned, shared, sized, take_back};
+use crate::arrays::{Answers, Handle, Items, MaybeSlot, Versioned, sized};
 use crate::batch::{THIS_THREAD, checked_flags};
-use crate::status::{Failure, Outcome, Status, guarded};
+use crate::interface::{frees, functions};
+use crate::recipe::unknown;
+use crate::status::{Failure, Outcome};
 use crate::threads::{Place, Threads};
 
 /// Points that a thread takes at a time. The kernel keeps so many on the calling thread.
@@ -71,53 +75,36 @@ impl From<antumbra::ClosestPoint> for Near {
 }
 
 /// Points of the caller, checked.
-struct Points<'a> {
+pub struct Points<'a> {
     points: Items<'a, [f32; 3]>,
     limits: Option<Items<'a, f32>>,
     place: Place<'a>,
 }
 
-impl Points<'_> {
+impl<'a> Points<'a> {
     /// # Safety
     /// If the pointer is not null, it is of a structure as the header says.
-    unsafe fn new(points: *const PointOptions) -> Outcome<Self> {
+    pub unsafe fn new(points: *const PointOptions) -> Outcome<Self> {
         // SAFETY: the caller's promise.
         let options = unsafe { sized(points, "points") }?;
-        let PointOptions {
-            count,
-            max_distance_stride,
-            ..
-        } = options;
         let flags = checked_flags(options.flags, THIS_THREAD, "points->flags")?;
         if options.reserved != 0 {
-            return Err(crate::recipe::unknown(options.reserved, "points->reserved"));
+            return Err(unknown(options.reserved, "points->reserved"));
         }
+        let (count, points) = (options.count, options.points.cast());
         // SAFETY: as above, for the arrays of the structure.
         let (points, limits, place) = unsafe {
+            let (limits, stride) = (options.max_distances, options.max_distance_stride);
             (
-                Items::new(
-                    options.points.cast(),
-                    count,
-                    options.point_stride,
-                    "points->points",
-                )?,
-                Items::optional(
-                    options.max_distances,
-                    count,
-                    max_distance_stride,
-                    "max_distances",
-                )?,
-                Place::of(options.threads)?,
+                Items::new(points, count, options.point_stride, "points->points")?,
+                Items::optional(limits, count, stride, "max_distances")?,
+                Place::flagged(options.threads, flags)?,
             )
         };
         Ok(Self {
             points,
             limits,
-            place: if flags & THIS_THREAD != 0 {
-                Place::Here
-            } else {
-                place
-            },
+            place,
         })
     }
 
@@ -129,10 +116,12 @@ impl Points<'_> {
     /// Answers some points at a time, given the points and their limits.
     fn answer<A: Clone + Default + Send, C: Copy + Send>(
         &self,
-        answers: &Answers<'_, C>,
+        (answers, stride, name): (*mut C, usize, &str),
         query: impl Fn(&[[f32; 3]], &[f32], &mut [A]) + Sync + Send,
         told: impl Fn(&A) -> C + Sync + Send,
-    ) {
+    ) -> Outcome {
+        // SAFETY: the header says what is at this address of a call.
+        let answers = unsafe { Answers::new(answers, self.points.count(), stride, name) }?;
         type Memory<A> = (Vec<[f32; 3]>, Vec<f32>, Vec<A>);
         (self.place).in_pieces(
             self.points.count(),
@@ -150,75 +139,9 @@ impl Points<'_> {
                 }
             },
         );
+        Ok(())
     }
 }
-
-/// A query with an answer for each point.
-macro_rules! query {
-    ($name:ident, $doc:literal, $places:literal: $Found:ty, $Answer:ty, $query:expr, $told:expr) => {
-        #[doc = $doc]
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(
-            bvh: *const Bvh,
-            points: *const PointOptions,
-            answers: *mut $Answer,
-            stride: usize,
-        ) -> Status {
-            guarded(|| {
-                // SAFETY: the header says what is at these addresses.
-                let (bvh, points, answers) = unsafe {
-                    let points = Points::new(points)?;
-                    let answers = Answers::new(answers, points.points.count(), stride, $places)?;
-                    (shared(bvh, "bvh")?, points, answers)
-                };
-                let query: fn(&Bvh, &[[f32; 3]], &[f32], &mut [$Found]) = $query;
-                points.answer(
-                    &answers,
-                    |points, limits, found| query(bvh, points, limits, found),
-                    $told,
-                );
-                Ok(())
-            })
-        }
-    };
-}
-
-query!(
-    antumbra_closest,
-    "Finds the nearest primitive of each point.",
-    "closest": Option<antumbra::ClosestPoint>,
-    Near,
-    |bvh, points, limits, found| bvh.points(points).within(limits).closest_into(found),
-    |found| found.map_or(Near::NOTHING, Near::from)
-);
-query!(
-    antumbra_contains,
-    "Returns for each point whether it is inside.",
-    "inside": bool,
-    u8,
-    |bvh, points, _, found| bvh.points(points).inside_into(found),
-    |found| u8::from(*found)
-);
-query!(
-    antumbra_signed_distance,
-    "Returns the distance of each point, negative inside.",
-    "distances": f32,
-    f32,
-    |bvh, points, _, found| bvh.points(points).signed_distances_into(found),
-    |found| *found
-);
-query!(
-    antumbra_winding_number,
-    "Returns how often surfaces go around each point.",
-    "numbers": i32,
-    i32,
-    |bvh, points, _, found| {
-        for (point, found) in points.iter().zip(found) {
-            *found = bvh.winding_number(*point);
-        }
-    },
-    |found| *found
-);
 
 /// Primitives near points, one list after the other, `antumbra_closest_lists`.
 pub struct NearLists {
@@ -226,36 +149,58 @@ pub struct NearLists {
     items: Vec<Near>,
 }
 
-/// Lists the primitives within a distance of each point.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_within(
-    bvh: *const Bvh,
-    points: *const PointOptions,
-    lists: *mut *mut NearLists,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (bvh, points, slot) = unsafe {
-            let slot = Slot::handle(lists, "lists")?;
-            (shared(bvh, "bvh")?, Points::new(points)?, slot)
+functions! {
+    /// Writes the nearest primitive of each point within its largest distance. At equal distances the smallest (inst_id, geom_id,
+    /// prim_id).
+    fn antumbra_closest(bvh: &Bvh, points: Points<'_>, closest: *mut Near, stride: usize) {
+        let query = |points: &[[f32; 3]], limits: &[f32], found: &mut [_]| bvh.points(points).within(limits).closest_into(found);
+        points.answer((closest, stride, "closest"), query, |found| found.map_or(Near::NOTHING, Near::from))
+    }
+
+    /// Writes for each point whether it is inside of a sphere or a closed mesh: a byte, 1 or 0. Exact if every edge is shared, with
+    /// the same coordinates, by an even number of triangles. 0 for points that are not finite.
+    fn antumbra_contains(bvh: &Bvh, points: Points<'_>, inside: *mut u8, stride: usize) {
+        let query = |points: &[[f32; 3]], _: &[f32], found: &mut [bool]| bvh.points(points).inside_into(found);
+        points.answer((inside, stride, "inside"), query, |found| u8::from(*found))
+    }
+
+    /// Writes the distance of the nearest surface from each point, negative inside, see antumbra_contains(). INFINITY if there is no
+    /// geometry, NAN for points that are not finite.
+    fn antumbra_signed_distance(bvh: &Bvh, points: Points<'_>, distances: *mut f32, stride: usize) {
+        let query = |points: &[[f32; 3]], _: &[f32], found: &mut [f32]| bvh.points(points).signed_distances_into(found);
+        points.answer((distances, stride, "distances"), query, |found| *found)
+    }
+
+    /// Writes how often closed surfaces go around each point: 1 in a mesh whose triangles turn counter-clockwise seen from outside, 0
+    /// outside, the sum where bodies overlap.
+    fn antumbra_winding_number(
+        bvh: &Bvh,
+        points: Points<'_>,
+        numbers: *mut i32,
+        stride: usize,
+    ) {
+        let query = |points: &[[f32; 3]], _: &[f32], found: &mut [i32]| {
+            for (point, found) in points.iter().zip(found) {
+                *found = bvh.winding_number(*point);
+            }
         };
-        if points.limits.is_none() && points.points.count() > 0 {
+        points.answer((numbers, stride, "numbers"), query, |found| *found)
+    }
+
+    /// Lists all primitives within the largest distance of each point, the nearest first.
+    fn antumbra_within(bvh: &Bvh, points: Points<'_>, lists: Handle<NearLists>) {
+        let count = points.points.count();
+        if points.limits.is_none() && count > 0 {
             return Err(Failure::argument("`max_distances` is null"));
         }
-        let count = points.points.count();
-        let found = std::sync::Mutex::new(vec![Vec::new(); count]);
-        (points.place).in_pieces(count, PIECE, |_: &mut (), range| {
+        let found = Mutex::new(vec![Vec::new(); count]);
+        points.place.in_pieces(count, PIECE, |_: &mut (), range| {
             for index in range {
                 let near = bvh.within(points.points.get(index), points.limit(index));
-                let mut found = found
-                    .lock()
-                    .unwrap_or_else(std::sync::PoisonError::into_inner);
-                found[index] = near;
+                found.lock().unwrap_or_else(PoisonError::into_inner)[index] = near;
             }
         });
-        let found = found
-            .into_inner()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let found = found.into_inner().unwrap_or_else(PoisonError::into_inner);
         let mut joined = NearLists {
             splits: vec![0],
             items: Vec::with_capacity(found.iter().map(Vec::len).sum()),
@@ -264,45 +209,25 @@ pub unsafe extern "C" fn antumbra_within(
             joined.items.extend(near.into_iter().map(Near::from));
             joined.splits.push(joined.items.len());
         }
-        slot.give(joined);
+        lists.give(joined);
         Ok(())
-    })
+    }
+
+    /// Lends the arrays, as antumbra_hit_lists_get().
+    fn antumbra_closest_lists_get(
+        lists: &NearLists,
+        splits: MaybeSlot<*const usize>,
+        items: MaybeSlot<*const Near>,
+        item_count: MaybeSlot<usize>,
+    ) {
+        splits.put(lists.splits.as_ptr());
+        items.put(lists.items.as_ptr());
+        item_count.put(lists.items.len());
+        Ok(())
+    }
 }
 
-/// Returns the arrays of lists of near primitives.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_closest_lists_get(
-    lists: *const NearLists,
-    splits: *mut *const usize,
-    items: *mut *const Near,
-    item_count: *mut usize,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (lists, splits, items, item_count) = unsafe {
-            (
-                shared(lists, "lists")?,
-                Slot::optional(splits, "splits")?,
-                Slot::optional(items, "items")?,
-                Slot::optional(item_count, "item_count")?,
-            )
-        };
-        if let Some(splits) = splits {
-            splits.put(lists.splits.as_ptr());
-        }
-        if let Some(items) = items {
-            items.put(lists.items.as_ptr());
-        }
-        if let Some(item_count) = item_count {
-            item_count.put(lists.items.len());
-        }
-        Ok(())
-    })
-}
-
-/// Frees lists of near primitives.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_closest_lists_free(lists: *mut NearLists) {
-    // SAFETY: the header says that a handle is freed once.
-    unsafe { take_back(lists) }
+frees! {
+    /// Frees lists of near primitives.
+    fn antumbra_closest_lists_free(lists: NearLists);
 }

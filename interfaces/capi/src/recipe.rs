@@ -8,7 +8,8 @@ use antumbra::recipe::{Builder, Collapse, CostModel, Engine, Level, Order, Prese
 use antumbra::{Isa, Recipe, Width};
 
 use crate::arrays::{Slot, Versioned, sized, text};
-use crate::status::{Failure, Outcome, Status, guarded};
+use crate::interface::functions;
+use crate::status::{Failure, Outcome};
 
 /// Number that stands for a choice of the library.
 const AUTO: u32 = u32::MAX;
@@ -141,18 +142,14 @@ impl RecipeChoices {
     }
 }
 
-/// Makes a recipe that leaves all choices to a preset.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_recipe_init(
-    recipe: *mut RecipeChoices,
-    preset: *const c_char,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says that `recipe` is null or a place for a recipe.
-        let slot = unsafe { Slot::new(recipe, "recipe") }?;
+functions! {
+    /// Makes a recipe that leaves all choices to a preset; NULL for "default". Keeps the address of the name.
+    ///
+    /// Errors: INVALID_ARGUMENT for an unknown name.
+    fn antumbra_recipe_init(recipe: Slot<RecipeChoices>, preset: *const c_char) {
         // SAFETY: the header says that `preset` is null or a text.
         unsafe { named::<Preset>(preset, "preset") }?;
-        slot.put(RecipeChoices {
+        recipe.put(RecipeChoices {
             size: size_of::<RecipeChoices>(),
             preset,
             builder: std::ptr::null(),
@@ -171,5 +168,5 @@ pub unsafe extern "C" fn antumbra_recipe_init(
             reserved: 0,
         });
         Ok(())
-    })
+    }
 }

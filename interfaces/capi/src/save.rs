@@ -1,33 +1,17 @@
 //! Trees, objects and worlds in files and in memory.
 
-use std::ffi::{CStr, c_char};
-use std::fs::File;
 use std::io::{self, Write};
 use std::path::Path;
 
-use antumbra::{Bvh, Error, Object, World};
+use antumbra::saved::Saved;
+use antumbra::{Bvh, Error};
 
-use crate::arrays::{Items, Slot, shared, text};
+use crate::arrays::{Handle, Items, Slot};
 use crate::build::OwnObject;
-use crate::functions::FunctionLists;
-use crate::status::{Failure, Outcome, Status, guarded};
+use crate::functions::Given;
+use crate::interface::{FilePath, functions};
+use crate::status::{Failure, Outcome};
 use crate::world::OwnWorld;
-
-/// A path of the caller.
-#[cfg(unix)]
-fn path_of(path: &CStr) -> Outcome<&Path> {
-    use std::os::unix::ffi::OsStrExt;
-    Ok(Path::new(std::ffi::OsStr::from_bytes(path.to_bytes())))
-}
-
-/// A path of the caller, in UTF-8.
-#[cfg(not(unix))]
-fn path_of(path: &CStr) -> Outcome<&Path> {
-    let path = path
-        .to_str()
-        .map_err(|_| Failure::argument("`path` is not UTF-8"))?;
-    Ok(Path::new(path))
-}
 
 /// Writes a file as a whole or not at all.
 fn write_file(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<(), Error>) -> Outcome {
@@ -44,148 +28,129 @@ fn write_file(path: &Path, write: impl FnOnce(&mut dyn Write) -> Result<(), Erro
     written.map_err(|source| Failure::from(error(source)).about(&path.display().to_string()))
 }
 
-/// Opens a file to read.
-fn open(path: &Path) -> Outcome<File> {
-    let file = antumbra_files::open(path);
-    file.map_err(|error| Failure::from(Error::from(error)).about(&path.display().to_string()))
+/// Reads what a file holds.
+fn read<T: Saved>(path: &Path, given: &Given) -> Outcome<T> {
+    let about = |error| Failure::from(error).about(&path.display().to_string());
+    let file = antumbra_files::open(path).map_err(|error| about(Error::from(error)))?;
+    let read = given.functions.read(file).map_err(about)?;
+    given.keep();
+    Ok(read)
 }
 
-/// The four functions of a type.
-macro_rules! saved {
-    ($what:literal, $handle:literal, $Own:ty, $Kernel:ty, $kernel:expr, $own:expr, $save:ident, $load:ident, $to_memory:ident, $from_memory:ident) => {
-        #[doc = concat!("Writes ", $what, " into a file.")]
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $save(saved: *const $Own, path: *const c_char) -> Status {
-            guarded(|| {
-                // SAFETY: the header says what is at these addresses.
-                let (saved, path) = unsafe { (shared(saved, $handle)?, text(path, "path")?) };
-                let kernel: fn(&$Own) -> &$Kernel = $kernel;
-                write_file(path_of(path)?, |file| kernel(saved).write(file))
-            })
-        }
-
-        #[doc = concat!("Reads ", $what, " from a file.")]
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $load(
-            path: *const c_char,
-            functions: *const FunctionLists,
-            loaded: *mut *mut $Own,
-        ) -> Status {
-            guarded(|| {
-                // SAFETY: the header says what is at these addresses.
-                let (slot, path) = unsafe {
-                    (
-                        Slot::handle(loaded, $handle)?,
-                        path_of(text(path, "path")?)?,
-                    )
-                };
-                let file = open(path)?;
-                // SAFETY: the header says what the functions do.
-                let given = unsafe { FunctionLists::functions(functions) }?;
-                let loaded: Result<$Kernel, Error> = given.functions.read(file);
-                let loaded = loaded
-                    .map_err(|error| Failure::from(error).about(&path.display().to_string()))?;
-                let own: fn($Kernel) -> $Own = $own;
-                given.keep();
-                slot.give(own(loaded));
-                Ok(())
-            })
-        }
-
-        #[doc = concat!("Writes ", $what, " into memory.")]
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $to_memory(
-            saved: *const $Own,
-            bytes: *mut *mut u8,
-            byte_count: *mut usize,
-        ) -> Status {
-            guarded(|| {
-                // SAFETY: the header says what is at these addresses.
-                let (saved, bytes, byte_count) = unsafe {
-                    let bytes = Slot::handle(bytes, "bytes")?;
-                    (
-                        shared(saved, $handle)?,
-                        bytes,
-                        Slot::new(byte_count, "byte_count")?,
-                    )
-                };
-                let kernel: fn(&$Own) -> &$Kernel = $kernel;
-                let saved = kernel(saved).to_bytes().into_boxed_slice();
-                byte_count.put(saved.len());
-                bytes.put(Box::into_raw(saved).cast());
-                Ok(())
-            })
-        }
-
-        #[doc = concat!("Reads ", $what, " from memory.")]
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $from_memory(
-            bytes: *const u8,
-            byte_count: usize,
-            functions: *const FunctionLists,
-            loaded: *mut *mut $Own,
-        ) -> Status {
-            guarded(|| {
-                // SAFETY: the header says what is at these addresses.
-                let (slot, bytes) = unsafe {
-                    let bytes = Items::new(bytes, byte_count, 0, "bytes")?;
-                    (Slot::handle(loaded, $handle)?, bytes)
-                };
-                // SAFETY: the header says what the functions do.
-                let given = unsafe { FunctionLists::functions(functions) }?;
-                let loaded: $Kernel = given
-                    .functions
-                    .from_bytes(bytes.as_slice().unwrap_or_default())?;
-                let own: fn($Kernel) -> $Own = $own;
-                given.keep();
-                slot.give(own(loaded));
-                Ok(())
-            })
-        }
-    };
+/// Gives memory to the caller, who frees it by `antumbra_memory_free`.
+fn give(saved: Vec<u8>, bytes: &Handle<u8>, byte_count: &Slot<usize>) -> Outcome {
+    let saved = saved.into_boxed_slice();
+    byte_count.put(saved.len());
+    bytes.0.put(Box::into_raw(saved).cast());
+    Ok(())
 }
 
-saved!(
-    "a tree",
-    "bvh",
-    Bvh,
-    Bvh,
-    |bvh| bvh,
-    |bvh| bvh,
-    antumbra_bvh_save,
-    antumbra_bvh_load,
-    antumbra_bvh_to_memory,
-    antumbra_bvh_from_memory
-);
-saved!(
-    "an object",
-    "object",
-    OwnObject,
-    Object,
-    |object| &object.object,
-    |object| OwnObject {
-        object,
-        masks: Vec::new()
-    },
-    antumbra_object_save,
-    antumbra_object_load,
-    antumbra_object_to_memory,
-    antumbra_object_from_memory
-);
-saved!(
-    "a world",
-    "world",
-    OwnWorld,
-    World,
-    |world| &world.world,
-    OwnWorld::new,
-    antumbra_world_save,
-    antumbra_world_load,
-    antumbra_world_to_memory,
-    antumbra_world_from_memory
-);
+/// Reads what memory of the caller holds.
+///
+/// # Safety
+/// As of [`Items::new`].
+unsafe fn read_memory<T: Saved>(bytes: *const u8, count: usize, given: &Given) -> Outcome<T> {
+    // SAFETY: the caller's promise.
+    let bytes = unsafe { Items::new(bytes, count, 0, "bytes") }?;
+    let read = given
+        .functions
+        .from_bytes(bytes.as_slice().unwrap_or_default())?;
+    given.keep();
+    Ok(read)
+}
 
-/// Frees memory that a tree, an object or a world was written to.
+functions! {
+    /// Writes a tree, an object or a world into a file. Errors: IO.
+    fn antumbra_bvh_save(bvh: &Bvh, path: FilePath<'_>) {
+        write_file(path.0, |file| bvh.write(file))
+    }
+
+    /// Reads a tree, an object or a world from a file. `functions` may be NULL if the file needs none.
+    ///
+    /// Errors: IO, UNREADABLE, OTHER_FUNCTIONS.
+    fn antumbra_bvh_load(path: FilePath<'_>, functions: Given, bvh: Handle<Bvh>) {
+        bvh.give(read(path.0, &functions)?);
+        Ok(())
+    }
+
+    /// Writes what the save functions write into memory of the library, which antumbra_memory_free() frees.
+    fn antumbra_bvh_to_memory(bvh: &Bvh, bytes: Handle<u8>, byte_count: Slot<usize>) {
+        give(bvh.to_bytes(), &bytes, &byte_count)
+    }
+
+    /// Reads what the functions above wrote, as the load functions do. No byte may be left over.
+    fn antumbra_bvh_from_memory(
+        bytes: *const u8,
+        byte_count: usize,
+        functions: Given,
+        bvh: Handle<Bvh>,
+    ) {
+        // SAFETY: the header says what is at this address.
+        let read = unsafe { read_memory(bytes, byte_count, &functions) }?;
+        bvh.give(read);
+        Ok(())
+    }
+
+    /// As `antumbra_bvh_save`, of an object.
+    fn antumbra_object_save(object: &OwnObject, path: FilePath<'_>) {
+        write_file(path.0, |file| object.object.write(file))
+    }
+
+    /// As `antumbra_bvh_load`, of an object.
+    fn antumbra_object_load(path: FilePath<'_>, functions: Given, object: Handle<OwnObject>) {
+        object.give(OwnObject::new(read(path.0, &functions)?));
+        Ok(())
+    }
+
+    /// As `antumbra_bvh_to_memory`, of an object.
+    fn antumbra_object_to_memory(object: &OwnObject, bytes: Handle<u8>, byte_count: Slot<usize>) {
+        give(object.object.to_bytes(), &bytes, &byte_count)
+    }
+
+    /// As `antumbra_bvh_from_memory`, of an object.
+    fn antumbra_object_from_memory(
+        bytes: *const u8,
+        byte_count: usize,
+        functions: Given,
+        object: Handle<OwnObject>,
+    ) {
+        // SAFETY: the header says what is at this address.
+        let read = unsafe { read_memory(bytes, byte_count, &functions) }?;
+        object.give(OwnObject::new(read));
+        Ok(())
+    }
+
+    /// As `antumbra_bvh_save`, of a world.
+    fn antumbra_world_save(world: &OwnWorld, path: FilePath<'_>) {
+        write_file(path.0, |file| world.world.write(file))
+    }
+
+    /// As `antumbra_bvh_load`, of a world.
+    fn antumbra_world_load(path: FilePath<'_>, functions: Given, world: Handle<OwnWorld>) {
+        world.give(OwnWorld::new(read(path.0, &functions)?));
+        Ok(())
+    }
+
+    /// As `antumbra_bvh_to_memory`, of a world.
+    fn antumbra_world_to_memory(world: &OwnWorld, bytes: Handle<u8>, byte_count: Slot<usize>) {
+        give(world.world.to_bytes(), &bytes, &byte_count)
+    }
+
+    /// As `antumbra_bvh_from_memory`, of a world.
+    fn antumbra_world_from_memory(
+        bytes: *const u8,
+        byte_count: usize,
+        functions: Given,
+        world: Handle<OwnWorld>,
+    ) {
+        // SAFETY: the header says what is at this address.
+        let read = unsafe { read_memory(bytes, byte_count, &functions) }?;
+        world.give(OwnWorld::new(read));
+        Ok(())
+    }
+}
+
+/// Frees memory that one of the functions above returned, with the number of bytes that it returned.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn antumbra_memory_free(bytes: *mut u8, byte_count: usize) {
     if !bytes.is_null() {

@@ -6,9 +6,10 @@ use antumbra::cutout::Opacity;
 use antumbra::shapes::{Curves, Disk, Sphere, TriangleMesh, UserGeometry};
 use antumbra::{Geometry, LocalOrigin};
 
-use crate::arrays::{Items, Slot, exclusive, shared, take_back};
+use crate::arrays::{Handle, Items, MaybeSlot, Slot};
 use crate::functions::{OpacityFunction, UserFunctions};
-use crate::status::{Failure, Outcome, Status, guarded};
+use crate::interface::{frees, functions};
+use crate::status::{Failure, Outcome, Status};
 
 /// A list of geometries, `antumbra_scene`.
 #[derive(Default)]
@@ -40,6 +41,15 @@ pub enum Part {
 }
 
 impl Part {
+    /// Opaque triangles.
+    pub fn triangles(positions: Vec<[f32; 3]>, indices: Vec<[u32; 3]>) -> Self {
+        Self::Triangles {
+            positions,
+            indices,
+            opacity: None,
+        }
+    }
+
     /// The geometry for the kernel.
     fn geometry(&self) -> Geometry<'_> {
         match self {
@@ -77,15 +87,13 @@ impl Scene {
         }
     }
 
-    pub fn add(&mut self, part: Part, geom_id: Option<Slot<u32>>) -> Outcome {
+    pub fn add(&mut self, part: Part, geom_id: &MaybeSlot<u32>) -> Outcome {
         let Ok(number) = u32::try_from(self.parts.len()) else {
             return Err(Failure::new(Status::TooMany, "more than 2^32 geometries"));
         };
         self.parts.push(part);
         self.masks.push(u32::MAX);
-        if let Some(geom_id) = geom_id {
-            geom_id.put(number);
-        }
+        geom_id.put(number);
         Ok(())
     }
 
@@ -125,35 +133,27 @@ impl Scene {
     }
 }
 
-/// Makes an empty scene.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_scene_new(scene: *mut *mut Scene) -> Status {
-    guarded(|| {
-        // SAFETY: the header says that `scene` is null or a place for a handle.
-        unsafe { Slot::handle(scene, "scene") }?.give(Scene::default());
+functions! {
+    /// Makes an empty scene.
+    fn antumbra_scene_new(scene: Handle<Scene>) {
+        scene.give(Scene::default());
         Ok(())
-    })
-}
+    }
 
-/// Frees a scene.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_scene_free(scene: *mut Scene) {
-    // SAFETY: the header says that a handle is freed once.
-    unsafe { take_back(scene) }
-}
+    /// Returns the number of geometries.
+    fn antumbra_scene_geometry_count(scene: &Scene, count: Slot<usize>) {
+        count.put(scene.parts.len());
+        Ok(())
+    }
 
-/// Sets the origin of points in double precision.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_scene_set_origin(
-    scene: *mut Scene,
-    origin: *const f64,
-) -> Status {
-    guarded(|| {
+    /// Sets the origin of points in double precision: 3 finite numbers. It is subtracted from them before they are rounded to
+    /// single precision. The default is 0. Hits, rays and points of queries are seen from the same origin. All scenes of one tree
+    /// need one origin; the middle of the coordinates is the best one.
+    ///
+    /// Errors: INVALID_ARGUMENT if the scene has a geometry already, or a number is not finite.
+    fn antumbra_scene_set_origin(scene: &mut Scene, origin: *const f64) {
         // SAFETY: the header says that `origin` is null or has three numbers.
-        let (scene, origin) = unsafe {
-            let origin = Items::<[f64; 3]>::new(origin.cast(), 1, 0, "origin")?;
-            (exclusive(scene, "scene")?, origin.get(0))
-        };
+        let origin = unsafe { Items::<[f64; 3]>::new(origin.cast(), 1, 0, "origin") }?.get(0);
         if !scene.parts.is_empty() {
             let text = "the origin must be set before the first geometry is added";
             return Err(Failure::argument(text));
@@ -165,93 +165,76 @@ pub unsafe extern "C" fn antumbra_scene_set_origin(
         }
         scene.origin = LocalOrigin { origin };
         Ok(())
-    })
-}
+    }
 
-/// Adds spheres.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_scene_add_spheres(
-    scene: *mut Scene,
-    centers: *const f32,
-    center_stride: usize,
-    radii: *const f32,
-    radius_stride: usize,
-    count: usize,
-    geom_id: *mut u32,
-) -> Status {
-    guarded(|| {
+    /// Adds spheres: `count` centres of 3 floats and radii of 1 float. For an array of (x, y, z, radius) give the address of the
+    /// first x and the address of the first radius, both with a stride of 16. One radius may serve all: ANTUMBRA_SAME_FOR_ALL.
+    /// Rays that start inside of a sphere hit it from within.
+    fn antumbra_scene_add_spheres(
+        scene: &mut Scene,
+        centers: *const f32,
+        center_stride: usize,
+        radii: *const f32,
+        radius_stride: usize,
+        count: usize,
+        geom_id: MaybeSlot<u32>,
+    ) {
         // SAFETY: the header says what is at these addresses.
-        let (scene, centers, radii, geom_id) = unsafe {
+        let (centers, radii) = unsafe {
             let centers = Items::<[f32; 3]>::new(centers.cast(), count, center_stride, "centers")?;
-            let radii = Items::<f32>::or_same(radii, count, radius_stride, "radii")?;
-            (
-                exclusive(scene, "scene")?,
-                centers,
-                radii,
-                Slot::optional(geom_id, "geom_id")?,
-            )
+            (centers, Items::or_same(radii, count, radius_stride, "radii")?)
         };
         let spheres = (0..count).map(|index| Sphere {
             center: centers.get(index),
             radius: radii.get(index),
         });
-        scene.add(Part::Spheres(spheres.collect()), geom_id)
-    })
-}
+        scene.add(Part::Spheres(spheres.collect()), &geom_id)
+    }
 
-/// Adds flat disks.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_scene_add_disks(
-    scene: *mut Scene,
-    centers: *const f32,
-    center_stride: usize,
-    normals: *const f32,
-    normal_stride: usize,
-    radii: *const f32,
-    radius_stride: usize,
-    count: usize,
-    geom_id: *mut u32,
-) -> Status {
-    guarded(|| {
+    /// Adds flat disks, which are hit from both sides: `count` centres and normals of 3 floats and radii of 1 float. Normals may
+    /// have any length but zero. One normal and one radius may serve all: ANTUMBRA_SAME_FOR_ALL.
+    fn antumbra_scene_add_disks(
+        scene: &mut Scene,
+        centers: *const f32,
+        center_stride: usize,
+        normals: *const f32,
+        normal_stride: usize,
+        radii: *const f32,
+        radius_stride: usize,
+        count: usize,
+        geom_id: MaybeSlot<u32>,
+    ) {
         // SAFETY: the header says what is at these addresses.
-        let (scene, centers, normals, radii) = unsafe {
+        let (centers, normals, radii) = unsafe {
             let centers = Items::<[f32; 3]>::new(centers.cast(), count, center_stride, "centers")?;
-            let normals =
-                Items::<[f32; 3]>::or_same(normals.cast(), count, normal_stride, "normals")?;
-            let radii = Items::<f32>::or_same(radii, count, radius_stride, "radii")?;
-            (exclusive(scene, "scene")?, centers, normals, radii)
+            let normals = Items::or_same(normals.cast(), count, normal_stride, "normals")?;
+            (centers, normals, Items::or_same(radii, count, radius_stride, "radii")?)
         };
-        // SAFETY: as above.
-        let geom_id = unsafe { Slot::optional(geom_id, "geom_id") }?;
         let disks = (0..count).map(|index| Disk {
             center: centers.get(index),
             normal: normals.get(index),
             radius: radii.get(index),
         });
-        scene.add(Part::Disks(disks.collect()), geom_id)
-    })
-}
+        scene.add(Part::Disks(disks.collect()), &geom_id)
+    }
 
-/// Adds thin curves.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_scene_add_curves(
-    scene: *mut Scene,
-    points: *const f32,
-    point_count: usize,
-    point_stride: usize,
-    segments: *const u32,
-    segment_count: usize,
-    segment_stride: usize,
-    geom_id: *mut u32,
-) -> Status {
-    guarded(|| {
+    /// Adds thin curves: hair, fur, grass. `points` are x, y, z and radius. Segment i is straight, goes from point `segments[i]`
+    /// to the next one, and has the prim_id i. One that begins where the one before it in the list ends goes on there without a
+    /// gap. Without `segments` (NULL) all points are one curve, of one segment less. Segments are flat and face every ray, as
+    /// Embree's flat curves; rays hit what is within the radius of the axis. `u` of a hit goes along the segment, `v` across it,
+    /// with 1/2 on the axis.
+    fn antumbra_scene_add_curves(
+        scene: &mut Scene,
+        points: *const f32,
+        point_count: usize,
+        point_stride: usize,
+        segments: *const u32,
+        segment_count: usize,
+        segment_stride: usize,
+        geom_id: MaybeSlot<u32>,
+    ) {
         // SAFETY: the header says what is at these addresses.
-        let (scene, points, geom_id) = unsafe {
-            let points =
-                Items::<[f32; 4]>::new(points.cast(), point_count, point_stride, "points")?;
-            let geom_id = Slot::optional(geom_id, "geom_id")?;
-            (exclusive(scene, "scene")?, points.to_vec(), geom_id)
-        };
+        let points = unsafe { Items::new(points.cast(), point_count, point_stride, "points") }?;
         let whole = point_count.saturating_sub(1);
         let segments = if !segments.is_null() {
             // SAFETY: as above.
@@ -266,44 +249,34 @@ pub unsafe extern "C" fn antumbra_scene_add_curves(
                 Err(_) => return Err(Failure::new(Status::TooMany, "more than 2^32 segments")),
             }
         };
-        scene.add(Part::Curves { points, segments }, geom_id)
-    })
-}
+        let points = points.to_vec();
+        scene.add(Part::Curves { points, segments }, &geom_id)
+    }
 
-/// Adds user geometry.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_scene_add_user(
-    scene: *mut Scene,
-    count: u32,
-    functions: *const UserFunctions,
-    geom_id: *mut u32,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (scene, geom_id) = unsafe {
-            (
-                exclusive(scene, "scene")?,
-                Slot::optional(geom_id, "geom_id")?,
-            )
-        };
+    /// Adds user geometry of `count` primitives. The structure is copied; what `data` points to is not.
+    ///
+    /// Errors: INVALID_ARGUMENT if `bounds` or `intersect` is missing.
+    fn antumbra_scene_add_user(
+        scene: &mut Scene,
+        count: u32,
+        functions: *const UserFunctions,
+        geom_id: MaybeSlot<u32>,
+    ) {
         // SAFETY: the header says what the functions do.
         let (shape, data) = unsafe { UserFunctions::shape(functions, "functions") }?;
-        scene.add(Part::User(count, shape), geom_id)?;
+        scene.add(Part::User(count, shape), &geom_id)?;
         data.keep();
         Ok(())
-    })
-}
+    }
 
-/// Makes the triangles of a mesh partly transparent.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_scene_set_opacity(
-    scene: *mut Scene,
-    geom_id: u32,
-    opacity: *const OpacityFunction,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says that the handle is null or valid.
-        let scene = unsafe { exclusive(scene, "scene") }?;
+    /// Makes a triangle mesh partly transparent. The structure is copied; what `data` points to is not.
+    ///
+    /// Errors: INVALID_ARGUMENT; UNSUPPORTED if the geometry has no triangles.
+    fn antumbra_scene_set_opacity(
+        scene: &mut Scene,
+        geom_id: u32,
+        opacity: *const OpacityFunction,
+    ) {
         let Part::Triangles { opacity: own, .. } = scene.part(geom_id)? else {
             return Err(Failure::new(
                 Status::Unsupported,
@@ -315,35 +288,19 @@ pub unsafe extern "C" fn antumbra_scene_set_opacity(
         *own = Some(filter);
         data.keep();
         Ok(())
-    })
-}
+    }
 
-/// Sets the mask of a geometry.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_scene_set_mask(
-    scene: *mut Scene,
-    geom_id: u32,
-    mask: u32,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says that the handle is null or valid.
-        let scene = unsafe { exclusive(scene, "scene") }?;
+    /// Sets the mask of a geometry. Rays with a mask hit only geometries that have a bit in common with it. All bits are set
+    /// unless this function is called. Rays without a mask hit everything, also a geometry with the mask 0. Trees and objects take
+    /// the masks of their scenes when they are built.
+    fn antumbra_scene_set_mask(scene: &mut Scene, geom_id: u32, mask: u32) {
         scene.part(geom_id)?;
         scene.masks[geom_id as usize] = mask;
         Ok(())
-    })
+    }
 }
 
-/// Number of geometries.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_scene_geometry_count(
-    scene: *const Scene,
-    count: *mut usize,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (scene, count) = unsafe { (shared(scene, "scene")?, Slot::new(count, "count")?) };
-        count.put(scene.parts.len());
-        Ok(())
-    })
+frees! {
+    /// Frees a scene.
+    fn antumbra_scene_free(scene: Scene);
 }

@@ -2,8 +2,8 @@
 
 use antumbra::{Bvh, Hit, INVALID_ID, PrimId, Ray};
 
-use crate::arrays::{Slot, shared};
-use crate::status::{Status, guarded};
+use crate::arrays::Slot;
+use crate::interface::functions;
 
 /// A closest hit with position and normal, `antumbra_surface`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,50 +53,29 @@ pub fn occluder(found: Option<PrimId>) -> PrimId {
     found.unwrap_or(PrimId::NONE)
 }
 
-/// A query of one ray. The query is a part of the function, not a call through a pointer.
-macro_rules! single {
-    ($name:ident, $doc:literal, $place:literal: $Answer:ty, |$bvh:ident, $ray:ident| $query:expr) => {
-        #[doc = $doc]
-        #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(
-            bvh: *const Bvh,
-            ray: *const Ray,
-            answer: *mut $Answer,
-        ) -> Status {
-            guarded(|| {
-                // SAFETY: the header says what is at these addresses.
-                let ($bvh, $ray, slot) = unsafe {
-                    let slot = Slot::new(answer, $place)?;
-                    (shared(bvh, "bvh")?, shared(ray, "ray")?, slot)
-                };
-                slot.put($query);
-                Ok(())
-            })
-        }
-    };
-}
+functions! {
+    /// Returns whether anything is in the interval of a ray.
+    fn antumbra_occluded1(bvh: &Bvh, ray: &Ray, occluded: Slot<bool>) {
+        occluded.put(bvh.occluded(ray));
+        Ok(())
+    }
 
-single!(
-    antumbra_occluded1,
-    "Returns whether anything lies in the interval of a ray.",
-    "occluded": bool,
-    |bvh, ray| bvh.occluded(ray)
-);
-single!(
-    antumbra_intersect1,
-    "Finds the closest hit of a ray.",
-    "hit": Hit,
-    |bvh, ray| hit(bvh.intersect(ray))
-);
-single!(
-    antumbra_surface1,
-    "Finds the closest hit of a ray, with position and normal.",
-    "surface": Surface,
-    |bvh, ray| surface(bvh.surface(ray))
-);
-single!(
-    antumbra_occluder1,
-    "Finds any occluder of a ray.",
-    "occluder": PrimId,
-    |bvh, ray| occluder(bvh.query(ray).occluder())
-);
+    /// Returns the closest hit of a ray.
+    fn antumbra_intersect1(bvh: &Bvh, ray: &Ray, hit: Slot<Hit>) {
+        hit.put(self::hit(bvh.intersect(ray)));
+        Ok(())
+    }
+
+    /// Returns the closest hit of a ray with position and normal.
+    fn antumbra_surface1(bvh: &Bvh, ray: &Ray, surface: Slot<Surface>) {
+        surface.put(self::surface(bvh.surface(ray)));
+        Ok(())
+    }
+
+    /// Returns any primitive in the interval of a ray, not the closest one; all ids are ANTUMBRA_INVALID_ID if there is none. Which
+    /// primitive it is depends on the tree, whether there is one does not.
+    fn antumbra_occluder1(bvh: &Bvh, ray: &Ray, occluder: Slot<PrimId>) {
+        occluder.put(self::occluder(bvh.query(ray).occluder()));
+        Ok(())
+    }
+}

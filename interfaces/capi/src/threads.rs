@@ -5,9 +5,10 @@ use std::ops::Range;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::arrays::{Slot, optional, shared, take_back};
-use crate::batch::FEW;
-use crate::status::{Failure, Outcome, Status, guarded};
+use crate::arrays::{Handle, Slot, optional};
+use crate::batch::{FEW, THIS_THREAD};
+use crate::interface::{frees, functions};
+use crate::status::{Failure, Outcome, Status};
 
 /// Most threads of a pool.
 const MOST: usize = 1 << 12;
@@ -15,48 +16,6 @@ const MOST: usize = 1 << 12;
 /// A pool of threads, `antumbra_threads`.
 pub struct Threads {
     pool: ThreadPool,
-}
-
-/// Makes a pool of `count` threads; 0 for one per core.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_threads_new(count: usize, threads: *mut *mut Threads) -> Status {
-    guarded(|| {
-        // SAFETY: the header says that `threads` is null or a place for a handle.
-        let threads = unsafe { Slot::handle(threads, "threads") }?;
-        if count > MOST {
-            return Err(Failure::argument(format_args!(
-                "{count} threads are more than {MOST}"
-            )));
-        }
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(count)
-            .thread_name(|index| format!("antumbra-{index}"))
-            .build()
-            .map_err(|error| Failure::new(Status::NoThreads, error))?;
-        threads.give(Threads { pool });
-        Ok(())
-    })
-}
-
-/// Number of threads of a pool.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_threads_count(
-    threads: *const Threads,
-    count: *mut usize,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says that both are null or valid.
-        let (threads, count) = unsafe { (shared(threads, "threads")?, Slot::new(count, "count")?) };
-        count.put(threads.pool.current_num_threads());
-        Ok(())
-    })
-}
-
-/// Ends the threads of a pool.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_threads_free(threads: *mut Threads) {
-    // SAFETY: the header says that a handle is freed once.
-    unsafe { take_back(threads) }
 }
 
 /// Where a call works.
@@ -81,6 +40,19 @@ impl<'a> Place<'a> {
         Ok(threads.map_or(Self::Default, |threads: &'a Threads| {
             Self::Pool(&threads.pool)
         }))
+    }
+
+    /// Where a call works that says `threads` and flags.
+    ///
+    /// # Safety
+    /// As [`optional`].
+    pub unsafe fn flagged(threads: *const Threads, flags: u32) -> Outcome<Self> {
+        // SAFETY: the caller's promise.
+        let place = unsafe { Self::of(threads) }?;
+        Ok(match flags & THIS_THREAD {
+            0 => place,
+            _ => Self::Here,
+        })
     }
 
     /// Runs work that shares itself among the threads of the pool it runs in.
@@ -122,4 +94,35 @@ impl<'a> Place<'a> {
                 .for_each_init(M::default, |memory, piece| work(memory, range(piece)));
         });
     }
+}
+
+functions! {
+    /// Makes a pool of `count` threads; 0 for one per core. At most 4096.
+    ///
+    /// Errors: INVALID_ARGUMENT, NO_THREADS.
+    fn antumbra_threads_new(count: usize, threads: Handle<Threads>) {
+        if count > MOST {
+            return Err(Failure::argument(format_args!(
+                "{count} threads are more than {MOST}"
+            )));
+        }
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(count)
+            .thread_name(|index| format!("antumbra-{index}"))
+            .build()
+            .map_err(|error| Failure::new(Status::NoThreads, error))?;
+        threads.give(Threads { pool });
+        Ok(())
+    }
+
+    /// Returns the number of threads of a pool.
+    fn antumbra_threads_count(threads: &Threads, count: Slot<usize>) {
+        count.put(threads.pool.current_num_threads());
+        Ok(())
+    }
+}
+
+frees! {
+    /// Ends a pool. No call may use it any more.
+    fn antumbra_threads_free(threads: Threads);
 }

@@ -2,11 +2,12 @@
 
 use antumbra::{Bvh, Masks};
 
-use crate::arrays::{Items, Slot, Versioned, exclusive, shared};
+use crate::arrays::{Items, MaybeSlot, Slot, Versioned};
 use crate::functions::Box3;
+use crate::interface::functions;
 use crate::scene::Scene;
-use crate::status::{Failure, Status, guarded};
-use crate::threads::{Place, Threads};
+use crate::status::{Failure, Status};
+use crate::threads::Place;
 
 /// What was built, `antumbra_report`.
 #[derive(Clone, Copy, Debug)]
@@ -35,18 +36,15 @@ unsafe impl Versioned for Report {
     const NAME: &'static str = "antumbra_report";
 }
 
-/// Returns what was built.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_bvh_report(bvh: *const Bvh, report: *mut Report) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (bvh, slot) = unsafe { (shared(bvh, "bvh")?, Slot::new(report, "report")?) };
+functions! {
+    /// Returns what was built.
+    fn antumbra_bvh_report(bvh: &Bvh, report: Slot<Report>) {
         let built = bvh.report();
         let mut level = [0; 16];
         for (to, from) in level[..15].iter_mut().zip(bvh.isa().level().name().bytes()) {
             *to = from;
         }
-        slot.put(Report {
+        report.put(Report {
             size: size_of::<Report>(),
             primitives: built.primitives,
             cutouts: built.cutouts,
@@ -65,85 +63,46 @@ pub unsafe extern "C" fn antumbra_bvh_report(bvh: *const Bvh, report: *mut Repor
             level,
         });
         Ok(())
-    })
-}
+    }
 
-/// Returns the smallest box around everything, and the origin offset.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_bvh_bounds(
-    bvh: *const Bvh,
-    bounds: *mut Box3,
-    origin_offset: *mut f32,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (bvh, bounds, offset) = unsafe {
-            let offset = Slot::optional(origin_offset, "origin_offset")?;
-            (
-                shared(bvh, "bvh")?,
-                Slot::optional(bounds, "bounds")?,
-                offset,
-            )
-        };
+    /// Returns the smallest box around everything, empty for an empty tree, and the distance from a surface at which rays that
+    /// leave it should begin. Rays that begin nearer have exact answers too, but take longer. Both may be NULL.
+    fn antumbra_bvh_bounds(bvh: &Bvh, bounds: MaybeSlot<Box3>, origin_offset: MaybeSlot<f32>) {
         let found = bvh.bounds();
-        if let Some(bounds) = bounds {
-            let (min, max) = (found.min, found.max);
-            bounds.put(Box3 { min, max });
-        }
-        if let Some(offset) = offset {
-            offset.put(found.origin_offset());
-        }
+        let (min, max) = (found.min, found.max);
+        bounds.put(Box3 { min, max });
+        origin_offset.put(found.origin_offset());
         Ok(())
-    })
-}
+    }
 
-/// Replaces the masks of all geometries.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_bvh_set_masks(
-    bvh: *mut Bvh,
-    masks: *const u32,
-    count: usize,
-) -> Status {
-    guarded(|| {
+    /// Replaces the masks of all geometries of a tree: mask i belongs to geometry i. Geometries behind the last mask have all bits.
+    /// Files do not hold masks, so loaded trees need them again.
+    ///
+    /// Errors: UNSUPPORTED if the tree has instances.
+    fn antumbra_bvh_set_masks(bvh: &mut Bvh, masks: *const u32, count: usize) {
         // SAFETY: the header says what is at these addresses.
-        let (bvh, masks) = unsafe {
-            let masks = Items::new(masks, count, 0, "masks")?;
-            (exclusive(bvh, "bvh")?, masks)
-        };
+        let masks = unsafe { Items::new(masks, count, 0, "masks") }?;
         if bvh.report().instances > 0 {
             let text = "a tree with instances takes its masks from scenes and instances";
             return Err(Failure::new(Status::Unsupported, text));
         }
         bvh.set_masks(Masks::new().world(masks.to_vec()));
         Ok(())
-    })
-}
+    }
 
-/// Moves the primitives of a tree.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_bvh_refit(
-    bvh: *mut Bvh,
-    scene: *const Scene,
-    threads: *const Threads,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (bvh, scene, place) = unsafe {
-            let place = Place::of(threads)?;
-            (exclusive(bvh, "bvh")?, shared(scene, "scene")?, place)
-        };
+    /// Moves the primitives of a tree. `scene` has the geometries of the build with other vertices: see
+    /// antumbra_scene_set_positions(). Far cheaper than a build. Answers equal the answers of a new tree, bit for bit. A refit keeps the
+    /// nodes, so queries become slower the more the primitives move: see antumbra_bvh_quality(). Masks stay.
+    ///
+    /// Errors: OTHER_GEOMETRY if other primitives can be hit than at the build; UNSUPPORTED if the tree has instances.
+    fn antumbra_bvh_refit(bvh: &mut Bvh, scene: &Scene, threads: Place<'_>) {
         let geometries = scene.geometries();
-        Ok(place.run(|| bvh.refit(&geometries))?)
-    })
-}
+        Ok(threads.run(|| bvh.refit(&geometries))?)
+    }
 
-/// Returns what a ray costs now over what it cost when the tree was built.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_bvh_quality(bvh: *const Bvh, quality: *mut f64) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (bvh, slot) = unsafe { (shared(bvh, "bvh")?, Slot::new(quality, "quality")?) };
-        slot.put(bvh.report().quality);
+    /// Returns the expected cost of a ray now over that before the first refit. Build again from about 1.5 on.
+    fn antumbra_bvh_quality(bvh: &Bvh, quality: Slot<f64>) {
+        quality.put(bvh.report().quality);
         Ok(())
-    })
+    }
 }

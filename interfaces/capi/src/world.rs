@@ -2,11 +2,12 @@
 
 use antumbra::{Bvh, INVALID_ID, Instance, Masks, Object, World};
 
-use crate::arrays::{Items, Plain, Slot, exclusive, handles, optional, shared, take_back};
+use crate::arrays::{Handle, Items, MaybeSlot, Plain, Slot, handles};
 use crate::build::OwnObject;
+use crate::interface::{frees, functions};
 use crate::scene::Scene;
-use crate::status::{Failure, Outcome, Status, guarded, if_no_memory};
-use crate::threads::{Place, Threads};
+use crate::status::{Failure, Outcome, if_no_memory};
+use crate::threads::Place;
 
 /// An instance of the caller, `antumbra_instance`.
 #[derive(Clone, Copy, Debug)]
@@ -71,118 +72,6 @@ fn object_masks(masks: &mut Masks, object: usize) -> &mut Vec<u32> {
     &mut masks.objects[object]
 }
 
-/// Makes a world.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_world_new(
-    ground: *const OwnObject,
-    objects: *const *const OwnObject,
-    object_count: usize,
-    instances: *const Placed,
-    instance_count: usize,
-    threads: *const Threads,
-    world: *mut *mut OwnWorld,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (slot, ground, objects, instances, place) = unsafe {
-            let slot = Slot::handle(world, "world")?;
-            let instances = Items::new(instances, instance_count, 0, "instances")?;
-            let objects = handles(objects, object_count, "objects")?;
-            let ground = optional(ground, "ground")?;
-            (slot, ground, objects, instances, Place::of(threads)?)
-        };
-        let kernel_objects: Vec<&Object> = objects.iter().map(|object| &object.object).collect();
-        let (placed, instance_masks) = instances_of(&instances)?;
-        let world = place.run(|| match ground {
-            Some(ground) => World::on_ground(&ground.object, &kernel_objects, &placed),
-            None => World::new(&kernel_objects, &placed),
-        })?;
-        let mut world = OwnWorld::new(world);
-        world.change_masks(|masks| {
-            masks.world = ground
-                .map(|ground| ground.masks.clone())
-                .unwrap_or_default();
-            masks.instances = instance_masks;
-            for (index, object) in objects.iter().enumerate() {
-                if !object.masks.is_empty() {
-                    object_masks(masks, index).clone_from(&object.masks);
-                }
-            }
-        });
-        slot.give(world);
-        Ok(())
-    })
-}
-
-/// Frees a world.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_world_free(world: *mut OwnWorld) {
-    // SAFETY: the header says that a handle is freed once.
-    unsafe { take_back(world) }
-}
-
-/// The tree of a world.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_world_bvh(
-    world: *const OwnWorld,
-    bvh: *mut *const Bvh,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (world, slot) = unsafe { (shared(world, "world")?, Slot::new(bvh, "bvh")?) };
-        slot.put(std::ptr::from_ref::<Bvh>(&world.world));
-        Ok(())
-    })
-}
-
-/// Replaces the list of instances.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_world_set_instances(
-    world: *mut OwnWorld,
-    instances: *const Placed,
-    instance_count: usize,
-    threads: *const Threads,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (world, instances, place) = unsafe {
-            let instances = Items::new(instances, instance_count, 0, "instances")?;
-            (exclusive(world, "world")?, instances, Place::of(threads)?)
-        };
-        change(world, &[], &instances, place)
-    })
-}
-
-/// Moves the vertices of objects and replaces the list of instances.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_world_refit(
-    world: *mut OwnWorld,
-    objects: *const u32,
-    scenes: *const *const Scene,
-    object_count: usize,
-    instances: *const Placed,
-    instance_count: usize,
-    threads: *const Threads,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (world, objects, scenes, instances, place) = unsafe {
-            let objects = Items::new(objects, object_count, 0, "objects")?;
-            let scenes = handles(scenes, object_count, "scenes")?;
-            let instances = Items::new(instances, instance_count, 0, "instances")?;
-            (
-                exclusive(world, "world")?,
-                objects,
-                scenes,
-                instances,
-                Place::of(threads)?,
-            )
-        };
-        let moved: Vec<_> = objects.iter().zip(scenes).collect();
-        change(world, &moved, &instances, place)
-    })
-}
-
 /// Other vertices of objects, and other instances.
 fn change(
     world: &mut OwnWorld,
@@ -200,57 +89,6 @@ fn change(
     Ok(())
 }
 
-/// Adds an object.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_world_add_object(
-    world: *mut OwnWorld,
-    object: *const OwnObject,
-    index: *mut u32,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (world, object, slot) = unsafe {
-            let slot = Slot::optional(index, "index")?;
-            (exclusive(world, "world")?, shared(object, "object")?, slot)
-        };
-        let index = world.world.add_object(&object.object)?;
-        if !object.masks.is_empty() {
-            world.change_masks(|masks| {
-                object_masks(masks, index as usize).clone_from(&object.masks)
-            });
-        }
-        if let Some(slot) = slot {
-            slot.put(index);
-        }
-        Ok(())
-    })
-}
-
-/// Sets the masks of the geometries of an object or of the ground.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_world_set_masks(
-    world: *mut OwnWorld,
-    object: u32,
-    masks: *const u32,
-    count: usize,
-) -> Status {
-    guarded(|| {
-        // SAFETY: the header says what is at these addresses.
-        let (world, masks) = unsafe {
-            let masks = Items::new(masks, count, 0, "masks")?;
-            (exclusive(world, "world")?, masks)
-        };
-        if object != INVALID_ID {
-            check_object(world, object)?;
-        }
-        world.change_masks(|all| match object {
-            INVALID_ID => all.world = masks.to_vec(),
-            object => *object_masks(all, object as usize) = masks.to_vec(),
-        });
-        Ok(())
-    })
-}
-
 /// Fails unless a world has an object of this number.
 fn check_object(world: &OwnWorld, object: u32) -> Outcome {
     let count = world.world.report().objects;
@@ -262,18 +100,134 @@ fn check_object(world: &OwnWorld, object: u32) -> Outcome {
     }
 }
 
-/// Returns what a ray in an object costs now over what it cost when the object was built.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn antumbra_world_quality(
-    world: *const OwnWorld,
-    object: u32,
-    quality: *mut f64,
-) -> Status {
-    guarded(|| {
+functions! {
+    /// Makes a world. `ground` is an object that is part of the world itself, or NULL. Takes the masks of objects
+    /// and instances. The place of an instance in the list is its inst_id. `threads` may be NULL.
+    ///
+    /// Errors: BAD_GEOMETRY if an instance names an object that is not there; OTHER_GEOMETRY if objects have different widths.
+    fn antumbra_world_new(
+        ground: Option<&OwnObject>,
+        objects: *const *const OwnObject,
+        object_count: usize,
+        instances: *const Placed,
+        instance_count: usize,
+        threads: Place<'_>,
+        world: Handle<OwnWorld>,
+    ) {
         // SAFETY: the header says what is at these addresses.
-        let (world, slot) = unsafe { (shared(world, "world")?, Slot::new(quality, "quality")?) };
-        check_object(world, object)?;
-        slot.put(world.world.quality(object));
+        let (objects, instances) = unsafe {
+            let objects = handles(objects, object_count, "objects")?;
+            (objects, Items::new(instances, instance_count, 0, "instances")?)
+        };
+        let of_kernel: Vec<&Object> = objects.iter().map(|object| &object.object).collect();
+        let (placed, instance_masks) = instances_of(&instances)?;
+        let made = threads.run(|| match ground {
+            Some(ground) => World::on_ground(&ground.object, &of_kernel, &placed),
+            None => World::new(&of_kernel, &placed),
+        })?;
+        let mut made = OwnWorld::new(made);
+        made.change_masks(|masks| {
+            masks.world = ground.map(|ground| ground.masks.clone()).unwrap_or_default();
+            masks.instances = instance_masks;
+            for (index, object) in objects.iter().enumerate() {
+                if !object.masks.is_empty() {
+                    object_masks(masks, index).clone_from(&object.masks);
+                }
+            }
+        });
+        world.give(made);
         Ok(())
-    })
+    }
+
+    /// Lends the tree over everything, for queries. It lives as long as the world, also when instances change, and is not freed. No
+    /// query may run while a function changes the world.
+    fn antumbra_world_bvh(world: &OwnWorld, bvh: Slot<*const Bvh>) {
+        bvh.put(std::ptr::from_ref::<Bvh>(&world.world));
+        Ok(())
+    }
+
+    /// Replaces the list of instances: some may have moved, some be new, some be gone. Builds the nodes above the objects again.
+    /// Instances that are as they were cost least. If it fails the world stays as it was.
+    ///
+    /// Errors: BAD_GEOMETRY if an instance names an object that is not there.
+    fn antumbra_world_set_instances(
+        world: &mut OwnWorld,
+        instances: *const Placed,
+        instance_count: usize,
+        threads: Place<'_>,
+    ) {
+        // SAFETY: the header says what is at these addresses.
+        let instances = unsafe { Items::new(instances, instance_count, 0, "instances") }?;
+        change(world, &[], &instances, threads)
+    }
+
+    /// Moves the vertices of some objects, and replaces the list of instances. Object objects[i] takes the vertices of scenes[i], see
+    /// antumbra_bvh_refit(). ANTUMBRA_INVALID_ID stands for the ground. If it fails the world stays as it was.
+    ///
+    /// Errors: as antumbra_bvh_refit() and antumbra_world_set_instances().
+    fn antumbra_world_refit(
+        world: &mut OwnWorld,
+        objects: *const u32,
+        scenes: *const *const Scene,
+        object_count: usize,
+        instances: *const Placed,
+        instance_count: usize,
+        threads: Place<'_>,
+    ) {
+        // SAFETY: the header says what is at these addresses.
+        let (objects, scenes, instances) = unsafe {
+            let objects = Items::new(objects, object_count, 0, "objects")?;
+            let scenes = handles(scenes, object_count, "scenes")?;
+            (objects, scenes, Items::new(instances, instance_count, 0, "instances")?)
+        };
+        let moved: Vec<_> = objects.iter().zip(scenes).collect();
+        change(world, &moved, &instances, threads)
+    }
+
+    /// Adds an object, which no instance places yet, and returns its index. `index` may be NULL.
+    fn antumbra_world_add_object(
+        world: &mut OwnWorld,
+        object: &OwnObject,
+        index: MaybeSlot<u32>,
+    ) {
+        let number = world.world.add_object(&object.object)?;
+        if !object.masks.is_empty() {
+            world.change_masks(|masks| {
+                object_masks(masks, number as usize).clone_from(&object.masks)
+            });
+        }
+        index.put(number);
+        Ok(())
+    }
+
+    /// Replaces the masks of the geometries of an object, or of the ground with ANTUMBRA_INVALID_ID: see antumbra_bvh_set_masks().
+    fn antumbra_world_set_masks(
+        world: &mut OwnWorld,
+        object: u32,
+        masks: *const u32,
+        count: usize,
+    ) {
+        // SAFETY: the header says what is at these addresses.
+        let masks = unsafe { Items::new(masks, count, 0, "masks") }?;
+        if object != INVALID_ID {
+            check_object(world, object)?;
+        }
+        world.change_masks(|all| match object {
+            INVALID_ID => all.world = masks.to_vec(),
+            object => *object_masks(all, object as usize) = masks.to_vec(),
+        });
+        Ok(())
+    }
+
+    /// antumbra_bvh_quality() of an object of a world.
+    fn antumbra_world_quality(world: &OwnWorld, object: u32, quality: Slot<f64>) {
+        check_object(world, object)?;
+        quality.put(world.world.quality(object));
+        Ok(())
+    }
+}
+
+frees! {
+    /// Frees a world.
+    fn antumbra_world_free(world: OwnWorld);
 }

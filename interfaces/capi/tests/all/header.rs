@@ -53,29 +53,26 @@ fn declared() -> BTreeSet<String> {
     names.filter(|name| name.starts_with("antumbra_")).collect()
 }
 
-/// Names of functions that the sources export. Those that macros make are found by the uses of these.
+/// Names of functions that the sources export: those of the list, and the few that are written out.
 fn defined() -> BTreeSet<String> {
-    let mut names = BTreeSet::new();
-    for file in std::fs::read_dir(here().join("src")).expect("sources") {
-        let text = std::fs::read_to_string(file.expect("a file").path()).expect("text");
-        let code: String = text
-            .lines()
-            .filter(|line| !line.trim_start().starts_with("//"))
-            .fold(String::new(), |all, line| all + line + "\n");
-        for (place, _) in code.match_indices("antumbra_") {
-            // A definition, or the name in the use of a macro.
-            let before = code[..place].trim_end();
-            let name = words(&code[place..]).next().expect("a name");
-            let after = code[place + name.len()..].trim_start();
-            let is_definition = before.ends_with(" fn") && after.starts_with('(');
-            let is_use = before.ends_with("!(")
-                || (before.ends_with(',') && (after.starts_with(',') || after.starts_with(')')));
-            if is_definition || is_use {
-                names.insert(name.to_owned());
-            }
-        }
+    let mut names: BTreeSet<_> = listed().into_iter().map(|function| function.name).collect();
+    for text in sources() {
+        let written = text
+            .split("\npub extern \"C\" fn ")
+            .chain(text.split("\npub unsafe extern \"C\" fn "));
+        names.extend(
+            written
+                .filter_map(|rest| Some(rest.split_once('(')?.0.to_owned()))
+                .filter(|name| name.starts_with("antumbra_") && !name.contains(' ')),
+        );
     }
     names
+}
+
+/// Texts of the sources.
+fn sources() -> impl Iterator<Item = String> {
+    let files = std::fs::read_dir(here().join("src")).expect("sources");
+    files.map(|file| std::fs::read_to_string(file.expect("a file").path()).expect("text"))
 }
 
 #[test]
@@ -282,4 +279,230 @@ fn numbers_are_the_same() {
         })
         .into();
     assert_eq!(version.join("."), env!("CARGO_PKG_VERSION"));
+}
+
+/// A function of the list in the sources: its documentation, and the types of Rust of its parameters.
+struct Listed {
+    name: String,
+    docs: Vec<String>,
+    parameters: Vec<(String, String)>,
+    is_free: bool,
+}
+
+/// Functions that stand under `functions!` and `frees!`.
+fn listed() -> Vec<Listed> {
+    let mut all = Vec::new();
+    for text in sources() {
+        for (opening, is_free) in [("\nfunctions! {\n", false), ("\nfrees! {\n", true)] {
+            let Some((_, block)) = text.split_once(opening) else {
+                continue;
+            };
+            let (block, _) = block.split_once("\n}\n").expect("an end");
+            let mut docs = Vec::new();
+            let mut lines = block.lines();
+            while let Some(line) = lines.next() {
+                if let Some(doc) = line.strip_prefix("    ///") {
+                    docs.push(doc.trim_start().to_owned());
+                } else if let Some(first) = line.strip_prefix("    fn ") {
+                    let mut signature = first.to_owned();
+                    while !signature.ends_with(['{', ';']) {
+                        signature += lines.next().expect("parameters").trim();
+                        signature.push(' ');
+                        signature = signature.trim_end().to_owned();
+                    }
+                    all.push(function(&signature, std::mem::take(&mut docs), is_free));
+                }
+            }
+        }
+    }
+    all
+}
+
+fn function(signature: &str, docs: Vec<String>, is_free: bool) -> Listed {
+    let (name, rest) = signature.split_once('(').expect("parameters");
+    let (parameters, _) = rest.rsplit_once(')').expect("parameters");
+    // No type of the list has a comma.
+    let parameters = parameters.split(',').filter_map(|part| {
+        let (name, kind) = part.split_once(':')?;
+        Some((name.trim().to_owned(), kind.trim().to_owned()))
+    });
+    Listed {
+        name: name.to_owned(),
+        docs,
+        parameters: parameters.collect(),
+        is_free,
+    }
+}
+
+/// Name in C of a type of Rust.
+fn in_c(name: &str) -> String {
+    let known = match name {
+        "u8" | "u32" | "u64" | "i32" => {
+            return format!("{}int{}_t", &name[..1].replace('i', ""), &name[1..]);
+        }
+        "usize" => "size_t",
+        "f32" => "float",
+        "f64" => "double",
+        "bool" => "bool",
+        "c_char" => "char",
+        "c_void" => "void",
+        "OwnObject" => "antumbra_object",
+        "OwnWorld" => "antumbra_world",
+        "Placed" => "antumbra_instance",
+        "Near" => "antumbra_closest_point",
+        "NearLists" => "antumbra_closest_lists",
+        "Box3" => "antumbra_box",
+        "UserFunctions" => "antumbra_user_geometry",
+        "OpacityFunction" => "antumbra_opacity",
+        "RecipeChoices" => "antumbra_recipe",
+        _ => {
+            let mut snake = String::from("antumbra");
+            for c in name.chars() {
+                if c.is_uppercase() {
+                    snake.push('_');
+                }
+                snake.push(c.to_ascii_lowercase());
+            }
+            return snake;
+        }
+    };
+    known.to_owned()
+}
+
+/// A parameter as C declares it.
+fn declaration(name: &str, kind: &str) -> String {
+    let inner = |open: &str| {
+        kind.strip_prefix(open)
+            .and_then(|kind| kind.strip_suffix('>'))
+    };
+    let pointer = |before: &str, kind: &str, after: &str| {
+        let (before, kind) = match kind.strip_prefix("*const ") {
+            Some(kind) => ("const ", kind),
+            None => (before, kind),
+        };
+        format!("{before}{} {after}{name}", in_c(kind))
+    };
+    match kind {
+        "Place<'_>" => pointer("const ", "Threads", "*"),
+        "Prepared<'_>" => pointer("const ", "Build", "*"),
+        "Given" => pointer("const ", "Functions", "*"),
+        "Recipe" => pointer("const ", "Recipe", "*"),
+        "Rays<'_>" => pointer("const ", "Batch", "*"),
+        "FilePath<'_>" => pointer("const ", "c_char", "*"),
+        "Option<OnHit>" => {
+            format!("int32_t (*{name})(void *data, size_t ray, const antumbra_hit *hit)")
+        }
+        "Points<'_>" => pointer(
+            "const ",
+            if name == "group" { "Group" } else { "Points" },
+            "*",
+        ),
+        _ => {
+            if let Some(kind) = inner("Option<Handle<").and_then(|kind| kind.strip_suffix('>')) {
+                pointer("", kind, "**")
+            } else if let Some(kind) = inner("Handle<") {
+                pointer("", kind, "**")
+            } else if let Some(kind) = inner("Slot<").or(inner("MaybeSlot<")) {
+                let stars = if kind.starts_with('*') { "**" } else { "*" };
+                pointer("", kind, stars)
+            } else if let Some(kind) = kind.strip_prefix("&mut ").or(kind.strip_prefix("*mut ")) {
+                pointer("", kind, "*")
+            } else if let Some(kind) = kind.strip_prefix("*const *const ") {
+                pointer("const ", kind, "*const *")
+            } else if let Some(kind) =
+                (kind.strip_prefix('&').or(kind.strip_prefix("*const "))).or(inner("Option<&"))
+            {
+                pointer("const ", kind, "*")
+            } else {
+                format!("{} {name}", in_c(kind))
+            }
+        }
+    }
+}
+
+/// Widest line of a declaration.
+const WIDTH: usize = 129;
+
+impl Listed {
+    fn returns(&self) -> &'static str {
+        match self.is_free {
+            true => "void",
+            false => "antumbra_status",
+        }
+    }
+
+    fn prototype(&self) -> String {
+        let mut text = format!("ANTUMBRA_API {} {}(", self.returns(), self.name);
+        let indent = text.len();
+        let mut column = indent;
+        let count = self.parameters.len();
+        for (index, (name, kind)) in self.parameters.iter().enumerate() {
+            let kind = if self.is_free {
+                format!("&mut {kind}")
+            } else {
+                kind.clone()
+            };
+            let end = if index + 1 == count { ");" } else { "," };
+            let part = declaration(name, &kind) + end;
+            if index > 0 {
+                if column + 1 + part.len() > WIDTH {
+                    text += &format!("\n{}", " ".repeat(indent));
+                    column = indent;
+                } else {
+                    text.push(' ');
+                    column += 1;
+                }
+            }
+            column += part.len();
+            text += &part;
+        }
+        text
+    }
+
+    fn comment(&self) -> String {
+        let mut text = String::from("/*");
+        for (index, line) in self.docs.iter().enumerate() {
+            let begin = if index == 0 { " " } else { "\n * " };
+            text += (begin.to_owned() + line).trim_end_matches(' ');
+        }
+        text + " */\n"
+    }
+}
+
+/// The header with the declarations that the sources say. Text between them stays.
+fn written(header: &str) -> String {
+    let mut text = header.to_owned();
+    for function in listed() {
+        let line = format!("\nANTUMBRA_API {} {}(", function.returns(), function.name);
+        let place = text.find(&line);
+        let begin = place.unwrap_or_else(|| panic!("add{line}); to the header")) + 1;
+        let end = begin + text[begin..].find(';').expect("an end") + 1;
+        // Of declarations that share a comment, the first has it.
+        let (begin, comment) = match text[..begin].ends_with("*/\n") {
+            true => (
+                text[..begin].rfind("/*").expect("a comment"),
+                function.comment(),
+            ),
+            false => (begin, String::new()),
+        };
+        text.replace_range(begin..end, &(comment + &function.prototype()));
+    }
+    text
+}
+
+/// `ANTUMBRA_WRITE=1 cargo test -p antumbra-capi declarations` writes them anew.
+#[test]
+fn declarations_are_written_from_the_sources() {
+    let path = here().join("include/antumbra.h");
+    let header = std::fs::read_to_string(&path).expect("the header");
+    let written = written(&header);
+    if std::env::var_os("ANTUMBRA_WRITE").is_some() {
+        std::fs::write(&path, written).expect("written");
+        return;
+    }
+    let differs = header.lines().zip(written.lines()).find(|(a, b)| a != b);
+    assert!(
+        header == written,
+        "the sources say another header, at {differs:?}: run ANTUMBRA_WRITE=1 cargo test -p antumbra-capi declarations"
+    );
 }
