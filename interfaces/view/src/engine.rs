@@ -198,6 +198,33 @@ impl<'a> Engine<'a> {
             });
             return Ok(());
         }
+        let (look, camera, film) = self.aim(wish);
+        if let Some(day) = self.day.clone().filter(|_| wish.mode.is_sun()) {
+            return self.follow_sun(wish, &day, (look, &camera, &film), cancelled);
+        }
+        let is_it = |kept: &mut Kept| {
+            wish.mode == Mode::Picture && kept.look == look && kept.crop == wish.crop
+        };
+        if let Some(kept) = self.kept.take_if(is_it) {
+            return self.go_on(wish, kept, &camera, &film, cancelled);
+        }
+        self.first_look(wish, look, (&camera, &film), cancelled)?;
+        let has_moved = self.last.replace(look).is_some_and(|last| last != look);
+        if self.shared.is_outdated(wish.number) || (has_moved && self.moves_on(wish, cancelled)) {
+            return Ok(());
+        }
+        let kept = Kept {
+            look,
+            crop: wish.crop,
+            tiles: Arc::new(LiveTiles::new(&film)),
+            growth: Growth::default(),
+            status: self.shared.lock().status.clone(),
+        };
+        self.go_on(wish, kept, &camera, &film, cancelled)
+    }
+
+    /// Look, camera and film of a wish.
+    fn aim(&self, wish: &Wish) -> (Look, Camera, Film) {
         let own = &self.scene.camera;
         let look = wish.look.unwrap_or(self.home);
         let camera = match look == self.home {
@@ -210,15 +237,17 @@ impl<'a> Engine<'a> {
         if film.is_empty() {
             film.crop_window = self.scene.film.crop_window;
         }
-        if let Some(day) = self.day.clone().filter(|_| wish.mode.is_sun()) {
-            return self.follow_sun(wish, &day, (look, &camera, &film), cancelled);
-        }
-        let is_it = |kept: &mut Kept| {
-            wish.mode == Mode::Picture && kept.look == look && kept.crop == wish.crop
-        };
-        if let Some(kept) = self.kept.take_if(is_it) {
-            return self.go_on(wish, kept, &camera, &film, cancelled);
-        }
+        (look, camera, film)
+    }
+
+    /// Shows a coarse picture, as fine as the time allows.
+    fn first_look(
+        &mut self,
+        wish: &Wish,
+        look: Look,
+        (camera, film): (&Camera, &Film),
+        cancelled: &(dyn Fn() -> bool + Sync),
+    ) -> Result<(), Error> {
         let spp = self.options.spp;
         let spp = spp.unwrap_or(self.scene.sampler.pixel_samples);
         let learned = self.learning.is_of(&look);
@@ -229,7 +258,7 @@ impl<'a> Engine<'a> {
             status.wish = wish.number;
             status.mode = wish.mode;
             status.look = Some(look);
-            status.mirrored = is_mirrored(own);
+            status.mirrored = is_mirrored(&self.scene.camera);
             status.cropped = wish.crop.is_some();
             status.samples = 0;
             status.spp = spp;
@@ -242,8 +271,8 @@ impl<'a> Engine<'a> {
             }
         });
 
-        let scale = self.scale(&film);
-        let coarse = coarser(&film, scale);
+        let scale = self.scale(film);
+        let coarse = coarser(film, scale);
         let mut camera_of = camera.clone();
         if camera_of.screen_window.is_none() {
             let [width, height] = film.resolution.map(|side| side as f32);
@@ -264,30 +293,11 @@ impl<'a> Engine<'a> {
         };
         let tree = self.tree(wish.mode);
         let start = Instant::now();
-        let all = &mut Growth::default();
-        render_rounds(
-            &world,
-            &options,
-            &|| Arc::clone(&tree),
-            &watch,
-            &|_| {},
-            all,
-        )?;
+        let (tree, all) = (|| Arc::clone(&tree), &mut Growth::default());
+        render_rounds(&world, &options, &tree, &watch, &|_| {}, all)?;
         self.note_pace(start.elapsed(), tiles.window().area());
-        self.show(scale, &film, wish.mode, tiles);
-        let has_moved = self.last.replace(look).is_some_and(|last| last != look);
-        if self.shared.is_outdated(wish.number) || (has_moved && self.moves_on(wish, cancelled)) {
-            return Ok(());
-        }
-
-        let kept = Kept {
-            look,
-            crop: wish.crop,
-            tiles: Arc::new(LiveTiles::new(&film)),
-            growth: Growth::default(),
-            status: self.shared.lock().status.clone(),
-        };
-        self.go_on(wish, kept, &camera, &film, cancelled)
+        self.show(scale, film, wish.mode, tiles);
+        Ok(())
     }
 
     /// Shows a picture in full size as it is, and renders what it lacks. Keeps it, whatever happens, unless it is a map.

@@ -11,6 +11,7 @@
 //!
 //! - `preview.rs`, `tev.rs`: the first two
 //! - `server.rs`: the page's server: who may send requests, and which
+//! - `files.rs`: what is shown, as files
 //! - `guests.rs`: open connections, and who gives way when there are too many
 //! - `http.rs`: requests and answers
 //! - `stream.rs`: the stream that a page reads
@@ -24,6 +25,7 @@
 mod camera;
 mod engine;
 mod error;
+mod files;
 mod guests;
 mod http;
 mod preview;

@@ -15,16 +15,16 @@ use std::sync::{Arc, LazyLock};
 use std::thread;
 use std::time::Duration;
 
-use antumbra_image::{Rgb8Image, heatmap, palette};
-use antumbra_map::{Panel, PanelLegend, Steps, Theme, panels};
-use antumbra_render::{Options, Seen, World};
+use antumbra_image::palette;
+use antumbra_render::{Options, World};
 use antumbra_scene::Scene;
 use serde::Serialize;
 
 use crate::engine::Engine;
+use crate::files::{captioned, encoded};
 use crate::guests::{Guest, Guests};
 use crate::http::{Request, answer, begin_stream};
-use crate::state::{Change, Frame, Mode, Phase, Shared};
+use crate::state::{Change, Mode, Phase, Shared};
 use crate::sun::{Sun, SunDay};
 use crate::{Error, stream};
 
@@ -219,11 +219,8 @@ impl Door {
                 Ok(None) => return Ok(()),
                 Err(error) => {
                     if error.kind() == io::ErrorKind::InvalidData {
-                        plain(
-                            &mut writer,
-                            "400 Bad Request",
-                            "no request that is known here",
-                        )?;
+                        let reason = "no request that is known here";
+                        plain(&mut writer, "400 Bad Request", reason)?;
                     }
                     return Ok(());
                 }
@@ -255,28 +252,16 @@ impl Door {
             return Ok(false);
         };
         match (request.method.as_str(), name) {
-            ("GET", "") => answer(
-                out,
-                "200 OK",
-                "text/html; charset=utf-8",
-                "",
-                PAGE.as_bytes(),
-            )?,
+            ("GET", "") => answer(out, "200 OK", HTML, "", PAGE.as_bytes())?,
             ("GET", "stream") => {
                 begin_stream(out)?;
                 stream::run(&self.shared, out)?;
                 return Ok(true);
             }
-            ("POST", "wish") => {
-                let change = serde_json::from_slice::<Change>(&request.body);
-                let wish = change
-                    .map_err(|error| error.to_string())
-                    .and_then(|change| self.shared.wish(&change).map_err(str::to_owned));
-                match wish {
-                    Ok(number) => plain(out, "200 OK", &number.to_string())?,
-                    Err(reason) => plain(out, "400 Bad Request", &reason)?,
-                }
-            }
+            ("POST", "wish") => match self.wish(&request.body) {
+                Ok(number) => plain(out, "200 OK", &number.to_string())?,
+                Err(reason) => plain(out, "400 Bad Request", &reason)?,
+            },
             ("POST", "quit") => {
                 self.shared.change(|state| state.quit = true);
                 plain(out, "200 OK", "ends")?;
@@ -285,10 +270,11 @@ impl Door {
                 let exposure = request.value("ev").and_then(|ev| ev.parse().ok());
                 self.save(out, "png", exposure.unwrap_or(0.0))?;
             }
+            ("GET", "picture.exr") => self.save(out, "exr", 0.0)?,
             ("GET", "sun") => {
                 let day = self.shared.lock().day.clone();
                 match day.is_empty() {
-                    true => plain(out, "404 Not Found", "there is no day of sun")?,
+                    true => plain(out, "404 Not Found", NO_SUN)?,
                     false => answer(out, "200 OK", JSON, "", &day)?,
                 }
             }
@@ -301,18 +287,19 @@ impl Door {
                         let day = serde_json::to_vec(&probe.point([x, y])).unwrap_or_default();
                         answer(out, "200 OK", JSON, "", &day)?;
                     }
-                    (None, _) => plain(out, "404 Not Found", "there is no day of sun")?,
-                    _ => plain(
-                        out,
-                        "400 Bad Request",
-                        "x and y are fractions of the picture",
-                    )?,
+                    (None, _) => plain(out, "404 Not Found", NO_SUN)?,
+                    _ => plain(out, "400 Bad Request", NO_POINT)?,
                 }
             }
-            ("GET", "picture.exr") => self.save(out, "exr", 0.0)?,
             _ => plain(out, "404 Not Found", "nothing here")?,
         }
         Ok(false)
+    }
+
+    /// Takes a change of the wish. Returns the number of the wish.
+    fn wish(&self, body: &[u8]) -> Result<u64, String> {
+        let change = serde_json::from_slice::<Change>(body).map_err(|error| error.to_string())?;
+        self.shared.wish(&change).map_err(str::to_owned)
     }
 
     /// Rest of a path after the secret. Takes the same time wherever a guess goes wrong.
@@ -371,6 +358,9 @@ impl Door {
 }
 
 const JSON: &str = "application/json";
+const HTML: &str = "text/html; charset=utf-8";
+const NO_SUN: &str = "there is no day of sun";
+const NO_POINT: &str = "x and y are fractions of the picture";
 
 /// A day of sun, as the page gets it.
 #[derive(Serialize)]
@@ -392,76 +382,6 @@ impl<'a> Day<'a> {
             suns: &day.suns,
         }
     }
-}
-
-/// The bytes of a picture file. Errors are words for the viewer.
-fn encoded(frame: &Frame, extension: &str, exposure: f32) -> Result<Vec<u8>, String> {
-    let words = |error: antumbra_image::Error| error.to_string();
-    let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
-    let path = folder.path().join("picture").with_extension(extension);
-    if frame.mode.is_map() {
-        if extension != "png" {
-            return Err("a map is saved as PNG".into());
-        }
-        map(frame)?.write(&path).map_err(words)?;
-    } else {
-        let mut image = frame.tiles.image().map_err(|error| error.to_string())?;
-        if exposure.is_finite() && exposure != 0.0 {
-            let factor = exposure.clamp(-32.0, 32.0).exp2();
-            for value in image.pixels_mut().iter_mut().flatten() {
-                *value *= factor;
-            }
-        }
-        image.write(&path).map_err(words)?;
-    }
-    std::fs::read(&path).map_err(|error| error.to_string())
-}
-
-/// A picture of the sun of a day with its words, and the legend of hours, as PNG.
-fn captioned(frame: &Frame, day: &SunDay, hour: f64) -> Result<Vec<u8>, String> {
-    let image = frame.tiles.image().map_err(|error| error.to_string())?;
-    let minutes = (60.0 * hour).round() as u32;
-    let title = match frame.mode {
-        Mode::Hours => "Hours of direct sun".to_owned(),
-        _ => format!("Shadows at {:02}:{:02}", minutes / 60, minutes % 60),
-    };
-    let steps = Steps::between(0.0, f64::from(day.longest()), false);
-    let legend = PanelLegend {
-        quantity: "Direct sun",
-        unit: "h",
-        steps: &steps,
-        // No hours are beyond the longest ones.
-        values: &[],
-    };
-    let panel = Panel {
-        image: &image.to_srgb8(),
-        title: &title,
-        subtitle: &day.caption,
-        legend: (frame.mode == Mode::Hours).then_some(legend),
-    };
-    let drawing = panels(&[panel], Theme::Light).map_err(|error| error.to_string())?;
-    let pixels = drawing.pixels().map_err(|error| error.to_string())?;
-    pixels.to_png().map_err(|error| error.to_string())
-}
-
-/// A map of tests with its legend.
-fn map(frame: &Frame) -> Result<Rgb8Image, String> {
-    let window = frame.tiles.window();
-    let mut field = vec![0.0; window.area()];
-    for tile in frame.tiles.changed(&mut Seen::default()) {
-        let tests = tile.tests.as_deref().unwrap_or_default();
-        for (row, tests) in tests.chunks_exact(tile.window.width()).enumerate() {
-            let down = (tile.window.y0 - window.y0) as usize + row;
-            let start = down * window.width() + (tile.window.x0 - window.x0) as usize;
-            field[start..start + tests.len()].copy_from_slice(tests);
-        }
-    }
-    let options = heatmap::Options {
-        range: heatmap::Range::Percentile(99.5),
-        ..heatmap::Options::default()
-    };
-    heatmap::render(&field, window.width(), window.height(), &options)
-        .map_err(|error| error.to_string())
 }
 
 fn plain(out: &mut impl Write, status: &str, text: &str) -> io::Result<()> {
