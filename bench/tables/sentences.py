@@ -302,9 +302,9 @@ def moving(of):
 SOURCES = {
     MOVING: [
         ("squeezed by 10 000 or more", "setting"),
-        ("Of 16 384 rays", "science/bench/calls/src/motion.rs", "RAYS: usize = 1 << 14"),
-        ("at least 200 000 triangles", "science/bench/calls/src/motion.rs", "builtin:city:200000"),
-        ("each instance 5120", "science/bench/calls/src/motion.rs", "icosphere(4)"),
+        ("Of 16 384 rays", "science/bench/src/calls/motion.rs", "RAYS: usize = 1 << 14"),
+        ("at least 200 000 triangles", "science/bench/src/calls/motion.rs", "builtin:city:200000"),
+        ("each instance 5120", "science/bench/src/calls/motion.rs", "icosphere(4)"),
     ],
     "docs/src/gallery/standard.md": [
         ("CC BY 3.0", "cited"),
@@ -364,7 +364,7 @@ SOURCES = {
         ("batches of 1000 rays", "setting"),
         ("240,000 segments", "setting"),
         ("Fewer than 1000 triangles are not learned", "setting"),
-        ("4000 panes of glass", "science/bench/calls/src/transmission.rs", "const PANES: usize = 4000;"),
+        ("4000 panes of glass", "science/bench/src/calls/transmission.rs", "const PANES: usize = 4000;"),
         ("1 555 200 triangles", "bench/record/" + texts.SAVED, "8 children: 1555200 triangles"),
         ("pages of 4 KiB", "cited"),
         ("164 MB of memory and 84 MB in a file", "bench/record/" + texts.SAVED, "164 MB of memory, 84 MB of file"),

@@ -1,7 +1,10 @@
 //! How much faster one tree answers occlusion rays than another.
 
+use std::convert::Infallible;
+
 use antumbra::{Bvh, Ray};
 
+use crate::harness::{interleave, ratios};
 use crate::thread_time;
 
 /// Speedup of a tree over another one, measured interleaved on one thread.
@@ -24,31 +27,17 @@ pub fn gain(baseline: &Bvh, tree: &Bvh, rays: &[Ray], turns: usize) -> Option<Ga
         return None;
     }
     let mut answers = [vec![false; rays.len()], vec![false; rays.len()]];
-    let trees = [baseline, tree];
-    let mut time = |which: usize| {
+    let seconds = interleave(turns, 2, |which| {
         let start = thread_time::seconds();
-        let batch = trees[which].batch(rays).on_this_thread();
+        let batch = [baseline, tree][which].batch(rays).on_this_thread();
         batch.occluded_into(&mut answers[which]);
-        (thread_time::seconds() - start).max(1e-9)
-    };
-    // Warm up.
-    time(0);
-    time(1);
-    let mut ratios: Vec<f64> = (0..turns)
-        .map(|turn| match turn % 2 {
-            0 => {
-                let first = time(0);
-                first / time(1)
-            }
-            _ => {
-                let second = time(1);
-                time(0) / second
-            }
-        })
-        .collect();
+        Ok::<_, Infallible>((thread_time::seconds() - start).max(1e-9))
+    });
+    let Ok(seconds) = seconds;
     if answers[0] != answers[1] {
         return None;
     }
+    let mut ratios: Vec<f64> = ratios(&seconds[1], &seconds[0]).collect();
     ratios.sort_unstable_by(f64::total_cmp);
     let at = |share: f64| ratios[(share * (turns - 1) as f64).round() as usize];
     Some(Gain {

@@ -27,20 +27,24 @@
 //! returned, and written to a directory on request.
 //!
 //! - `study/`: the plan, its renderings and replays, and what each cost;  `report/`: a study as tables and a page
-//! - `bench/`: engines that take turns on one list of rays;  `bench/embree/`: the binding of the C library
+//! - `harness`: works that take turns, and their answers;  `embree/`: the binding of the C library
+//! - `bench/`: rates of rays, ours and Embree's, as cases of the harness
 //! - `compare/`: one picture whose queries many trees answer
 //! - `rays/`, `trees`: rays of camera paths, and trees of any builder, collapse and order
 //! - `gain`: how much faster one tree is than another
 //! - `still`: scenes whose rays need no time;  `watch`, `error`: progress, interruption, failure
 //! - `machine`, `table`, `output`: parts of all results
-// Denied, not forbidden: `bench::embree` calls a C library.
+// Denied, not forbidden: `embree` calls a C library.
 #![deny(unsafe_code)]
 
 pub mod bench;
 mod compare;
 mod counted;
+#[allow(unsafe_code, reason = "the binding of a C library")]
+pub mod embree;
 mod error;
 mod gain;
+pub mod harness;
 mod machine;
 mod output;
 mod rays;

@@ -9,12 +9,12 @@ use antumbra::{Bvh, Isa, Recipe, Width};
 use antumbra_render::Lowered;
 use antumbra_render::clock;
 
-use super::embree::{Device, Embree, Scene, isa};
-use super::measure::median;
 use super::model::Size;
 use super::pool;
 use super::record::{BuildRow, StepSeconds};
 use crate::Error;
+use crate::embree::{Device, Embree, Scene, SceneFlags, isa};
+use crate::harness::{interleave, median};
 use crate::watch::{self, Watcher};
 
 /// Structures to build, and how.
@@ -60,31 +60,23 @@ pub fn measure(plan: &Plan, watcher: &dyn Watcher) -> Result<Vec<BuildRow>, Erro
     let rival = plan.embree.zip(isa(plan.isa.level()));
     for &threads in plan.threads {
         let pool = pool(threads)?;
-        let mut ours = vec![Vec::new(); plan.builders.len()];
-        let mut theirs = Vec::new();
-        for round in 0..=plan.rounds {
-            for (&builder, all) in plan.builders.iter().zip(&mut ours) {
-                watch::check(watcher)?;
-                let built = pool.install(|| build(plan, builder))?;
-                if round > 0 {
-                    all.push(built);
-                }
+        let engines = plan.builders.len() + usize::from(rival.is_some());
+        let built = interleave(plan.rounds, engines, |which| {
+            watch::check(watcher)?;
+            if let Some(&builder) = plan.builders.get(which) {
+                return pool.install(|| build(plan, builder));
             }
-            if let Some((embree, isa)) = rival {
-                watch::check(watcher)?;
-                // Gone before our next turn: with few threads, one of its scheduler spins as long as it lives.
-                let device = Device::new(embree, isa, threads.get()).map_err(Error::Embree)?;
-                let scene = Scene::build(&device, plan.model, false).map_err(Error::Embree)?;
-                if round > 0 {
-                    theirs.push(Built {
-                        seconds: scene.seconds,
-                        bytes: scene.bytes,
-                        buffer_bytes: scene.buffer_bytes,
-                        times: None,
-                    });
-                }
-            }
-        }
+            let (embree, isa) = rival.ok_or_else(|| Error::report("no Embree"))?;
+            // Gone before our next turn: with few threads, one of its scheduler spins as long as it lives.
+            let device = Device::new(embree, Some(isa), threads.get())?;
+            let scene = Scene::build(&device, plan.model, SceneFlags::default())?;
+            Ok(Built {
+                seconds: scene.seconds,
+                bytes: scene.bytes,
+                buffer_bytes: scene.buffer_bytes,
+                times: None,
+            })
+        })?;
         let size = Size::of(plan.model);
         let row = |engine, builder, built: &[Built]| {
             let last = built.last()?;
@@ -106,10 +98,12 @@ pub fn measure(plan: &Plan, watcher: &dyn Watcher) -> Result<Vec<BuildRow>, Erro
                 buffer_bytes: last.buffer_bytes,
             })
         };
-        for (builder, built) in plan.builders.iter().zip(&ours) {
-            rows.extend(row("antumbra", builder.name(), built));
+        for (which, built) in built.iter().enumerate() {
+            rows.extend(match plan.builders.get(which) {
+                Some(builder) => row("antumbra", builder.name(), built),
+                None => row("embree", "medium", built),
+            });
         }
-        rows.extend(row("embree", "medium", &theirs));
     }
     Ok(rows)
 }

@@ -3,17 +3,14 @@
 //! [`run`] measures what [`Options`] say and returns [`Results`].
 //!
 //! - `model`: what is made of a scene, and its size;  `sphere`: spheres as meshes;  `reference`: the right answers
-//! - `engine`: what can be measured;  `ours`, `rival`: our trees and Embree as engines;  `embree`: the library
-//! - `measure`: engines taking turns;  `builds`: build times and sizes;  `kinds`: what there is beside plain triangles
+//! - `engine`: what can be measured;  `ours`, `rival`: our trees and Embree as engines
+//! - `builds`: build times and sizes;  `kinds`: what there is beside plain triangles
 //! - `record`: the JSON document;  `report`: tables and Markdown;  `chart`: its bars
 
 mod builds;
 mod chart;
-#[allow(unsafe_code, reason = "the binding of a C library")]
-mod embree;
 mod engine;
 mod kinds;
-mod measure;
 mod model;
 mod ours;
 mod record;
@@ -35,18 +32,18 @@ use antumbra_scene::Scene;
 use antumbra_trees::BUILDERS;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use crate::embree::{self, Device, SceneFlags};
+use crate::harness::{self, Answers, Measured, TOLERANCE, Team, median, median_ratio};
 use crate::still::still_world;
 use crate::watch::{self, Watcher};
 use crate::{Caller, Error, Machine, Rays, Table, collect_rays};
-use embree::Device;
-use engine::{Engine, Query, TreeLabel};
-use measure::{Outcome, median, median_ratio};
+use engine::{Engine, Label, Query, TreeLabel};
 use ours::{Api, Ingredients, Ours, Tree};
 use record::{KINDS, distinct};
 use reference::Reference;
 use rival::{Rival, Variant};
 
-pub use embree::Embree;
+pub use crate::embree::Embree;
 pub use model::Size;
 pub use record::{BuildRow, Check, Document, KindRow, Row, StepSeconds};
 
@@ -410,8 +407,9 @@ impl Bench<'_> {
             pool: &pool(NonZeroUsize::MIN)?,
             rounds: self.options.repeat,
             embree: self.options.embree,
+            watcher: self.watcher,
         };
-        let kinds::Found { rows, checks } = kinds::measure(&plan, self.watcher)?;
+        let kinds::Found { rows, checks } = kinds::measure(&plan)?;
         self.document.kinds.extend(rows);
         self.document.checks.extend(checks);
         Ok(())
@@ -501,14 +499,10 @@ impl Bench<'_> {
             for query in Query::ALL {
                 for (list, known) in lists.iter().zip(&known) {
                     let reference = list.reference.answers(query);
-                    let outcomes = measure::measure(
+                    let outcomes = measure(
                         &engines,
-                        query,
-                        &list.rays,
-                        reference,
-                        &pool,
-                        rounds,
-                        self.watcher,
+                        (query, &list.rays, reference),
+                        (&pool, rounds, self.watcher),
                     )?;
                     let blank = Row {
                         scene: name.to_owned(),
@@ -537,15 +531,60 @@ impl Bench<'_> {
         let Some((embree, isa)) = self.options.embree.zip(embree::isa(isa.level())) else {
             return Ok(None);
         };
-        let build = |robust| {
+        let build = |flags| {
             // All threads, whatever the queries will use: with one, a thread of Embree's scheduler spins until
             // the device goes, and takes its share of the core that the queries are timed on.
-            let device = Device::new(embree, isa, 0)?;
-            embree::Scene::build(&device, model, robust)
+            let device = Device::new(embree, Some(isa), 0)?;
+            embree::Scene::build(&device, model, flags)
         };
-        let scenes = build(false).and_then(|default| Ok([default, build(true)?]));
-        scenes.map(Some).map_err(Error::Embree)
+        let default = build(SceneFlags::default())?;
+        Ok(Some([default, build(SceneFlags::ROBUST)?]))
     }
+}
+
+/// Times and mistakes of one engine.
+struct Outcome {
+    label: Label,
+    seconds: Vec<f64>,
+    /// Rays answered otherwise than the reference says. Our own engines must give the same bits, others may be
+    /// off by rounding.
+    disagreements: usize,
+}
+
+impl Outcome {
+    fn new(label: Label, measured: Measured, right: &Answers) -> Self {
+        let tolerance = if label.tree.is_some() { 0.0 } else { TOLERANCE };
+        Self {
+            label,
+            seconds: measured.seconds,
+            disagreements: measured.answers.differing_from(right, tolerance),
+        }
+    }
+}
+
+/// Has every engine that knows the query answer rays. They are cut into as many runs as the pool has threads.
+fn measure(
+    engines: &[&dyn Engine],
+    (query, rays, right): (Query, &[Ray], &Answers),
+    (pool, rounds, watcher): (&ThreadPool, usize, &dyn Watcher),
+) -> Result<Vec<Outcome>, Error> {
+    let run_length = rays.len().div_ceil(pool.current_num_threads()).max(1);
+    let (mut labels, mut teams) = (Vec::new(), Vec::new());
+    for engine in engines {
+        let runs = rays.chunks(run_length);
+        if let Some(team) = runs
+            .map(|run| engine.work(query, run))
+            .collect::<Option<Team>>()
+        {
+            labels.push(engine.label());
+            teams.push(team);
+        }
+    }
+    let measured = harness::measure(teams, pool, rounds, watcher)?;
+    let outcomes = labels.into_iter().zip(measured);
+    Ok(outcomes
+        .map(|(label, measured)| Outcome::new(label, measured, right))
+        .collect())
 }
 
 /// Facts about a tree that need no clock.

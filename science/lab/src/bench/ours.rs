@@ -2,13 +2,14 @@
 
 use antumbra::parts::{Steps, TreeLog};
 use antumbra::recipe::{Collapse, Order};
-use antumbra::{Build, Bvh, Error, Hit, Isa, Primitives, Ray, Recipe, Stage, Width};
+use antumbra::{Build, Bvh, Error, Isa, Primitives, Ray, Recipe, Stage, Width};
 use antumbra_render::clock;
 use antumbra_trees::engine;
 
-use super::engine::{Answers, Engine, Label, Query, TreeLabel, Work};
+use super::engine::{Engine, Label, Query, TreeLabel};
 use crate::Rays;
 use crate::counted::{counted, sum};
+use crate::harness::{Work, each, work};
 
 /// A tree ready to be queried.
 pub struct Tree {
@@ -96,75 +97,15 @@ impl Engine for Ours<'_> {
     fn work<'a>(&'a self, query: Query, rays: &'a [Ray]) -> Option<Box<dyn Work + 'a>> {
         let (bvh, api) = (&self.tree.bvh, self.api);
         Some(match query {
-            Query::Occluded => Box::new(Occlusion {
-                bvh,
-                api,
-                rays,
-                answers: vec![false; rays.len()],
+            Query::Occluded => work(vec![false; rays.len()], move |answers| match api {
+                Api::Single => each(rays, answers, |ray| bvh.occluded(ray)),
+                Api::Batch => bvh.batch(rays).occluded_into(answers),
             }),
-            Query::Intersect => Box::new(Closest {
-                bvh,
-                api,
-                rays,
-                answers: vec![None; rays.len()],
+            Query::Intersect => work(vec![None; rays.len()], move |answers| match api {
+                Api::Single => each(rays, answers, |ray| bvh.intersect(ray)),
+                Api::Batch => bvh.batch(rays).intersect_into(answers),
             }),
         })
-    }
-}
-
-struct Occlusion<'a> {
-    bvh: &'a Bvh,
-    api: Api,
-    rays: &'a [Ray],
-    answers: Vec<bool>,
-}
-
-impl Work for Occlusion<'_> {
-    fn reset(&mut self) {
-        self.answers.fill(false);
-    }
-
-    fn run(&mut self) {
-        match self.api {
-            Api::Single => {
-                for (ray, answer) in self.rays.iter().zip(&mut self.answers) {
-                    *answer = self.bvh.occluded(ray);
-                }
-            }
-            Api::Batch => self.bvh.batch(self.rays).occluded_into(&mut self.answers),
-        }
-    }
-
-    fn answers(&self) -> Answers {
-        Answers::Occluded(self.answers.clone())
-    }
-}
-
-struct Closest<'a> {
-    bvh: &'a Bvh,
-    api: Api,
-    rays: &'a [Ray],
-    answers: Vec<Option<Hit>>,
-}
-
-impl Work for Closest<'_> {
-    fn reset(&mut self) {
-        self.answers.fill(None);
-    }
-
-    fn run(&mut self) {
-        match self.api {
-            Api::Single => {
-                for (ray, answer) in self.rays.iter().zip(&mut self.answers) {
-                    *answer = self.bvh.intersect(ray);
-                }
-            }
-            Api::Batch => self.bvh.batch(self.rays).intersect_into(&mut self.answers),
-        }
-    }
-
-    fn answers(&self) -> Answers {
-        Answers::of_hits(&self.answers)
     }
 }
 

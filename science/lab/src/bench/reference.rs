@@ -6,7 +6,8 @@
 use antumbra::{Brute, Bvh, Hit, Ray};
 use rayon::prelude::*;
 
-use super::engine::{Answers, Query};
+use super::engine::Query;
+use crate::harness::{Answer, Answers};
 
 /// Rays of a kind that are compared with brute force, evenly spread.
 const BRUTE_RAYS: usize = 128;
@@ -29,7 +30,7 @@ impl Reference {
         let hits: Vec<_> = rays.iter().map(|ray| bvh.intersect(ray)).collect();
         Self {
             occluded: Answers::Occluded(occluded),
-            distances: Answers::of_hits(&hits),
+            distances: Answer::all(&hits),
             hits,
         }
     }

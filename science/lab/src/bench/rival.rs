@@ -2,8 +2,9 @@
 
 use antumbra::Ray;
 
-use super::embree::{Packet, RayHit, Scene, SingleRay};
-use super::engine::{Answers, Engine, Label, Query, Work};
+use super::engine::{Engine, Label, Query};
+use crate::embree::{Packet, RayHit, Scene, SingleRay};
+use crate::harness::{Work, work};
 
 /// How Embree is queried.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,91 +50,21 @@ impl Engine for Rival<'_> {
 
     fn work<'a>(&'a self, query: Query, rays: &'a [Ray]) -> Option<Box<dyn Work + 'a>> {
         let scene = self.scene;
+        let packet = |rays: &[Ray]| Packet::new(0, rays.len(), |lane| rays[lane]);
         Some(match (query, self.variant) {
             (Query::Occluded, Variant::Packets) => {
-                let packets: Vec<_> = rays.chunks(16).map(Packet::new).collect();
-                Box::new(Packets {
-                    scene,
-                    fresh: packets.clone(),
-                    packets,
-                })
+                let packets = rays.chunks(16).map(packet).collect();
+                work(packets, |used| scene.occluded_packets(used))
             }
             (Query::Intersect, Variant::Packets) => return None,
-            (Query::Occluded, _) => Box::new(Occlusion {
-                scene,
-                rays,
-                used: rays.iter().map(SingleRay::new).collect(),
-            }),
-            (Query::Intersect, _) => Box::new(Closest {
-                scene,
-                rays,
-                used: rays.iter().map(RayHit::new).collect(),
-            }),
+            (Query::Occluded, _) => {
+                let rays = rays.iter().map(|&ray| SingleRay::from(ray)).collect();
+                work(rays, |used| scene.occluded_rays(used))
+            }
+            (Query::Intersect, _) => {
+                let rays = rays.iter().map(|&ray| RayHit::from(ray)).collect();
+                work(rays, |used| scene.intersect_rays(used))
+            }
         })
-    }
-}
-
-struct Occlusion<'a> {
-    scene: &'a Scene<'a>,
-    rays: &'a [Ray],
-    used: Vec<SingleRay>,
-}
-
-impl Work for Occlusion<'_> {
-    fn reset(&mut self) {
-        for (used, ray) in self.used.iter_mut().zip(self.rays) {
-            *used = SingleRay::new(ray);
-        }
-    }
-
-    fn run(&mut self) {
-        self.scene.occluded(&mut self.used);
-    }
-
-    fn answers(&self) -> Answers {
-        Answers::Occluded(self.used.iter().map(SingleRay::is_occluded).collect())
-    }
-}
-
-struct Closest<'a> {
-    scene: &'a Scene<'a>,
-    rays: &'a [Ray],
-    used: Vec<RayHit>,
-}
-
-impl Work for Closest<'_> {
-    fn reset(&mut self) {
-        for (used, ray) in self.used.iter_mut().zip(self.rays) {
-            *used = RayHit::new(ray);
-        }
-    }
-
-    fn run(&mut self) {
-        self.scene.intersect(&mut self.used);
-    }
-
-    fn answers(&self) -> Answers {
-        Answers::Distances(self.used.iter().map(RayHit::distance).collect())
-    }
-}
-
-struct Packets<'a> {
-    scene: &'a Scene<'a>,
-    /// Packets as before any query.
-    fresh: Vec<Packet>,
-    packets: Vec<Packet>,
-}
-
-impl Work for Packets<'_> {
-    fn reset(&mut self) {
-        self.packets.copy_from_slice(&self.fresh);
-    }
-
-    fn run(&mut self) {
-        self.scene.occluded_packets(&mut self.packets);
-    }
-
-    fn answers(&self) -> Answers {
-        Answers::Occluded(self.packets.iter().flat_map(Packet::occluded).collect())
     }
 }

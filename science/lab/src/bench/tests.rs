@@ -8,10 +8,11 @@ use antumbra::shapes::TriangleMesh;
 use antumbra::{Bvh, Geometry, Instance, Isa, Ray, Recipe, Width};
 use antumbra_render::Lowered;
 
-use super::embree::{self, Device, Embree, Scene};
-use super::engine::{Answers, Engine, Query, TreeLabel};
+use super::engine::{Engine, Query, TreeLabel};
 use super::ours::{Api, Ours, Tree};
 use super::rival::{Rival, Variant};
+use crate::embree::{self, Device, Embree, Scene, SceneFlags};
+use crate::harness::Answers;
 
 /// Holes in the squares of a checkerboard; closest hits see one more hole than occlusion does.
 #[derive(Debug)]
@@ -233,9 +234,9 @@ fn engines_agree_with_a_plain_loop_about_instances_and_holes() {
     };
     let embree = Embree::load(library.as_ref()).expect("Embree");
     for isa in antumbra::recipe::Level::available().filter_map(embree::isa) {
-        let device = Device::new(embree, isa, 1).expect("a device");
-        for robust in [false, true] {
-            let scene = Scene::build(&device, &model, robust).expect("a scene");
+        let device = Device::new(embree, Some(isa), 1).expect("a device");
+        for flags in [SceneFlags::default(), SceneFlags::ROBUST] {
+            let scene = Scene::build(&device, &model, flags).expect("a scene");
             let scene = &scene;
             check(&Rival {
                 scene,

@@ -1,19 +1,18 @@
 //! Our trees, queried with conditions on what counts.
 
-use antumbra::{Brute, Bvh, Hit, Masks, PrimId, Ray, Visit};
+use antumbra::{Brute, Hit, Masks, PrimId, Ray, RayQuery, Visit};
 
 use super::shapes::Sieve;
-use crate::bench::engine::{Answers, Engine, Label, Query, Work};
+use crate::bench::engine::{Engine, Label, Query};
 use crate::bench::ours::{Api, Ours, Tree};
+use crate::harness::{Work, work};
 
 /// Mask of all rays, and masks of which each has a bit in common with it: all is looked at, and nothing is hidden.
 const RAY_MASK: u32 = 0b11;
 
 /// Masks of the world.
 pub fn masks() -> Masks {
-    let mut masks = Masks::default();
-    masks.world = vec![0b10];
-    masks
+    Masks::new().world(vec![0b10])
 }
 
 /// Condition on the hits that count.
@@ -31,10 +30,26 @@ pub enum Condition<'a> {
     Visit,
 }
 
-impl Condition<'_> {
-    /// Whether there is such a query.
-    pub fn has(self, query: Query, api: Api) -> bool {
-        !matches!(self, Self::Visit) || (query, api) == (Query::Intersect, Api::Single)
+impl<'a> Condition<'a> {
+    /// All of them, by name.
+    pub fn all(starts: &'a [PrimId]) -> [(&'static str, Self); 5] {
+        [
+            ("closed", Self::Closed),
+            ("mask", Self::Mask),
+            ("except", Self::Except(starts)),
+            ("filter", Self::Filter),
+            ("visit", Self::Visit),
+        ]
+    }
+
+    fn of<'q>(self, query: RayQuery<'q>, ray: usize) -> RayQuery<'q> {
+        match self {
+            Self::Closed => query.closed(),
+            Self::Mask => query.mask(RAY_MASK),
+            Self::Except(starts) => query.except(starts[ray]),
+            Self::Filter => query.filter(&|hit: &Hit| Sieve.stops(hit.prim_id)),
+            Self::Visit => query,
+        }
     }
 }
 
@@ -42,8 +57,6 @@ impl Condition<'_> {
 pub struct Asked<'t> {
     pub tree: &'t Tree,
     pub api: Api,
-    /// All rays, of which the work of a thread is a part.
-    pub all: &'t [Ray],
     pub condition: Condition<'t>,
 }
 
@@ -54,101 +67,43 @@ impl Engine for Asked<'_> {
     }
 
     fn work<'a>(&'a self, query: Query, rays: &'a [Ray]) -> Option<Box<dyn Work + 'a>> {
-        // Everything is asked on one thread, so that primitives left out are those of the same places.
-        (self.condition.has(query, self.api) && rays.len() == self.all.len()).then(|| {
-            Box::new(Asking {
-                asked: self,
-                query,
-                rays,
-                occluded: vec![false; rays.len()],
-                hits: vec![None; rays.len()],
-            }) as Box<dyn Work>
+        let (bvh, condition) = (&self.tree.bvh, self.condition);
+        let batch = move || {
+            let batch = bvh.batch(rays);
+            match condition {
+                Condition::Closed => batch.closed(),
+                Condition::Mask => batch.mask(RAY_MASK),
+                Condition::Except(starts) => batch.except(starts),
+                Condition::Filter => batch.filter(&|_, hit: &Hit| Sieve.stops(hit.prim_id)),
+                Condition::Visit => batch,
+            }
+        };
+        let one = move |ray: usize| condition.of(bvh.query(&rays[ray]), ray);
+        let (free, none) = (vec![false; rays.len()], vec![None; rays.len()]);
+        Some(match (query, self.api, condition) {
+            (Query::Intersect, Api::Single, Condition::Visit) => work(none, move |hits| {
+                for (ray, hit) in hits.iter_mut().enumerate() {
+                    *hit = one(ray).visit_hits(|_| Visit::Accept);
+                }
+            }),
+            (.., Condition::Visit) => return None,
+            (Query::Occluded, Api::Single, _) => work(free, move |occluded| {
+                for (ray, occluded) in occluded.iter_mut().enumerate() {
+                    *occluded = one(ray).occluded();
+                }
+            }),
+            (Query::Intersect, Api::Single, _) => work(none, move |hits| {
+                for (ray, hit) in hits.iter_mut().enumerate() {
+                    *hit = one(ray).intersect();
+                }
+            }),
+            (Query::Occluded, Api::Batch, _) => {
+                work(free, move |occluded| batch().occluded_into(occluded))
+            }
+            (Query::Intersect, Api::Batch, _) => {
+                work(none, move |hits| batch().intersect_into(hits))
+            }
         })
-    }
-}
-
-struct Asking<'a> {
-    asked: &'a Asked<'a>,
-    query: Query,
-    rays: &'a [Ray],
-    occluded: Vec<bool>,
-    hits: Vec<Option<Hit>>,
-}
-
-impl Asking<'_> {
-    fn single(&mut self, bvh: &Bvh) {
-        let rays = self.rays.iter().enumerate();
-        match self.query {
-            Query::Occluded => {
-                for ((index, ray), answer) in rays.zip(&mut self.occluded) {
-                    *answer = match self.asked.condition {
-                        Condition::Closed => bvh.occluded(&ray.closed()),
-                        Condition::Mask => bvh.query(ray).mask(RAY_MASK).occluded(),
-                        Condition::Except(starts) => {
-                            bvh.query(ray).except(starts[index]).occluded()
-                        }
-                        Condition::Filter => bvh
-                            .query(ray)
-                            .filter(&|hit| Sieve.stops(hit.prim_id))
-                            .occluded(),
-                        Condition::Visit => bvh.query(ray).visit_hits(|_| Visit::Accept).is_some(),
-                    }
-                }
-            }
-            Query::Intersect => {
-                for ((index, ray), answer) in rays.zip(&mut self.hits) {
-                    *answer = match self.asked.condition {
-                        Condition::Closed => bvh.intersect(&ray.closed()),
-                        Condition::Mask => bvh.query(ray).mask(RAY_MASK).intersect(),
-                        Condition::Except(starts) => {
-                            bvh.query(ray).except(starts[index]).intersect()
-                        }
-                        Condition::Filter => bvh
-                            .query(ray)
-                            .filter(&|hit| Sieve.stops(hit.prim_id))
-                            .intersect(),
-                        Condition::Visit => bvh.query(ray).visit_hits(|_| Visit::Accept),
-                    }
-                }
-            }
-        }
-    }
-
-    fn batch(&mut self, bvh: &Bvh) {
-        let mut batch = bvh.batch(self.rays);
-        match self.asked.condition {
-            Condition::Closed => batch = batch.closed(),
-            Condition::Mask => batch = batch.mask(RAY_MASK),
-            Condition::Except(starts) => batch = batch.except(starts),
-            Condition::Filter => batch = batch.filter(&|_, hit| Sieve.stops(hit.prim_id)),
-            Condition::Visit => {}
-        }
-        match self.query {
-            Query::Occluded => batch.occluded_into(&mut self.occluded),
-            Query::Intersect => batch.intersect_into(&mut self.hits),
-        }
-    }
-}
-
-impl Work for Asking<'_> {
-    fn reset(&mut self) {
-        self.occluded.fill(false);
-        self.hits.fill(None);
-    }
-
-    fn run(&mut self) {
-        let bvh = &self.asked.tree.bvh;
-        match self.asked.api {
-            Api::Single => self.single(bvh),
-            Api::Batch => self.batch(bvh),
-        }
-    }
-
-    fn answers(&self) -> Answers {
-        match self.query {
-            Query::Occluded => Answers::Occluded(self.occluded.clone()),
-            Query::Intersect => Answers::of_hits(&self.hits),
-        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Cost of everything beside plain triangles: quads, user geometry, conditions on hits, vertices that move,
 //! points. Beside Embree, where it has the same.
 //!
-//! - this file: which rows there are;  `shapes`: one mesh as several kinds of geometry
+//! - this file: one case, and the cases of rays;  `shapes`: one mesh as several kinds of geometry
 //! - `asked`: our trees, queried with conditions;  `moving`: refits;  `points`: what is near a point
 
 mod asked;
@@ -9,19 +9,21 @@ mod moving;
 mod points;
 mod shapes;
 
+use std::sync::Arc;
+
 use antumbra::{Brute, Isa, PrimId, Primitives, Ray, Recipe, Width};
 use antumbra_render::Lowered;
 use rayon::ThreadPool;
 
-use super::embree::{self, Device, Embree, Scene};
-use super::engine::{Answers, Engine, Query};
-use super::measure::{Outcome, measure_each, median, median_ratio};
+use super::Outcome;
+use super::engine::{Engine, Label, Query};
 use super::ours::{Api, Ingredients, Ours, Tree};
 use super::record::{Check, KindRow};
 use super::rival::{Rival, Variant};
-use crate::Error;
-use crate::Rays;
-use crate::watch::{self, Watcher};
+use crate::embree::{self, Device, Embree, Scene, SceneFlags};
+use crate::harness::{self, Answers, Work, median, median_ratio};
+use crate::watch::Watcher;
+use crate::{Error, Rays};
 use asked::{Asked, Condition};
 use shapes::Merged;
 
@@ -41,6 +43,7 @@ pub struct Plan<'a> {
     pub pool: &'a ThreadPool,
     pub rounds: usize,
     pub embree: Option<Embree>,
+    pub watcher: &'a dyn Watcher,
 }
 
 /// Rows, and the number of rays that brute force answered.
@@ -51,28 +54,23 @@ pub struct Found {
 }
 
 /// Measures everything on one thread. A scene with instances, or without a mesh, has no rows.
-pub fn measure(plan: &Plan, watcher: &dyn Watcher) -> Result<Found, Error> {
+pub fn measure(plan: &Plan) -> Result<Found, Error> {
     let mut found = Found::default();
     let mesh = Merged::new(plan.model);
     if !plan.model.instances.is_empty() || mesh.indices.is_empty() {
-        watcher.note(&format!(
+        plan.watcher.note(&format!(
             "{}: kinds are measured in scenes of one level only",
             plan.scene
         ));
         return Ok(found);
     }
-    let device = || -> Result<_, Error> {
-        let Some((embree, isa)) = plan.embree.zip(embree::isa(plan.isa.level())) else {
-            return Ok(None);
-        };
-        Device::new(embree, isa, 0).map(Some).map_err(Error::Embree)
+    let device = match plan.embree.zip(embree::isa(plan.isa.level())) {
+        Some((embree, isa)) => Some(Device::new(embree, Some(isa), 0)?),
+        None => None,
     };
-    let device = device()?;
-    rays(plan, &mesh, device.as_ref(), watcher, &mut found)?;
-    watch::check(watcher)?;
+    rays(plan, &mesh, device.as_ref(), &mut found)?;
     points::measure(plan, &mesh, device.as_ref(), &mut found)?;
-    watch::check(watcher)?;
-    moving::measure(plan, &mesh, device.as_ref(), watcher, &mut found)?;
+    moving::measure(plan, &mesh, device.as_ref(), &mut found)?;
     Ok(found)
 }
 
@@ -106,147 +104,161 @@ impl Plan<'_> {
     }
 }
 
-/// An engine of a kind.
+/// An engine of a kind, with its work.
 struct Entry<'a> {
     kind: &'static str,
-    engine: Box<dyn Engine + 'a>,
+    label: Label,
+    work: Box<dyn Work + 'a>,
+}
+
+impl<'a> Entry<'a> {
+    /// An engine that knows a query.
+    fn of(
+        kind: &'static str,
+        engine: &'a (dyn Engine + 'a),
+        query: Query,
+        rays: &'a [Ray],
+    ) -> Option<Self> {
+        let (label, work) = (engine.label(), engine.work(query, rays)?);
+        Some(Self { kind, label, work })
+    }
+}
+
+/// Questions of a case: what they are called in rows and in checks, and in a mesh of so many triangles.
+#[derive(Clone, Copy)]
+struct Questions {
+    query: &'static str,
+    check: &'static str,
+    triangles: usize,
+}
+
+impl Questions {
+    fn of(query: Query, triangles: usize) -> Self {
+        Self {
+            query: query.name(),
+            check: query.name(),
+            triangles,
+        }
+    }
+}
+
+/// Measures the engines of one case. The first of ours of each kind is right, if brute force says so.
+fn case(
+    plan: &Plan,
+    questions: Questions,
+    entries: Vec<Entry>,
+    brute: impl Fn(&str, usize) -> f32,
+    found: &mut Found,
+) -> Result<(), Error> {
+    let (names, teams): (Vec<_>, Vec<_>) = entries
+        .into_iter()
+        .map(|Entry { kind, label, work }| ((kind, label), vec![work]))
+        .unzip();
+    let measured = harness::measure(teams, plan.pool, plan.rounds, plan.watcher)?;
+    let mut right: Vec<(&str, Answers)> = Vec::new();
+    for ((kind, label), measured) in names.iter().zip(&measured) {
+        if label.tree.is_some() && right.iter().all(|(other, _)| other != kind) {
+            let disagreements = disagreements(&measured.answers, |index| brute(kind, index));
+            found.checks.push(Check {
+                scene: format!("{}, {kind}", plan.scene),
+                rays: questions.check,
+                ray_count: BRUTE_RAYS.min(measured.answers.len()),
+                disagreements,
+            });
+            right.push((kind, measured.answers.clone()));
+        }
+    }
+    let mut outcomes = Vec::new();
+    for ((kind, label), measured) in names.into_iter().zip(measured) {
+        if let Some((_, right)) = right.iter().find(|(other, _)| *other == kind) {
+            outcomes.push((kind, Outcome::new(label, measured, right), right.len()));
+        }
+    }
+    for (kind, outcome, count) in &outcomes {
+        let blank = plan.blank(kind, questions.query, questions.triangles);
+        let over = |kind: &str, label: &Label| {
+            let mut all = outcomes.iter();
+            let found = all.find(|(other, outcome, _)| *other == kind && outcome.label == *label);
+            found.map(|(_, other, _)| median_ratio(&outcome.seconds, &other.seconds))
+        };
+        found.rows.push(KindRow {
+            ratio_to_embree: over(kind, &Rival::REFERENCE),
+            ratio_to_triangles: over("triangles", &outcome.label),
+            ..row(&blank, outcome, *count)
+        });
+    }
+    Ok(())
 }
 
 /// Rows of all queries by rays.
 fn rays(
     plan: &Plan,
     mesh: &Merged,
-    device: Option<&std::sync::Arc<Device>>,
-    watcher: &dyn Watcher,
+    device: Option<&Arc<Device>>,
     found: &mut Found,
 ) -> Result<(), Error> {
-    let triangles = shapes::lowered(mesh.triangles());
-    let quads = shapes::lowered(mesh.quads());
-    let user = shapes::lowered(mesh.user());
-    let holes = shapes::lowered(mesh.holes());
-    let primitives = |model: &Lowered| model.primitives();
-    let (of_triangles, of_quads, of_user) = (
-        primitives(&triangles)?,
-        primitives(&quads)?,
-        primitives(&user)?,
-    );
-    let mut trees = [
-        plan.tree(&of_triangles)?,
-        plan.tree(&of_quads)?,
-        plan.tree(&of_user)?,
-    ];
+    const KINDS: [&str; 4] = ["triangles", "quads", "user", "filter"];
+    let models = [mesh.triangles(), mesh.quads(), mesh.user(), mesh.holes()].map(shapes::lowered);
+    let mut primitives = Vec::new();
+    for model in &models[..3] {
+        primitives.push(model.primitives()?);
+    }
+    let trees: Result<Vec<Tree>, Error> = primitives.iter().map(|one| plan.tree(one)).collect();
+    let mut trees = trees?;
     trees[0].bvh.set_masks(asked::masks());
-    let trees = &trees;
-    let scenes = device.map(|device| {
-        let build = |model| Scene::build(device, model, false).map_err(Error::Embree);
-        Ok::<_, Error>([
-            build(&triangles)?,
-            build(&quads)?,
-            build(&user)?,
-            build(&holes)?,
-        ])
-    });
-    let scenes = scenes.transpose()?;
-    let brutes = [&of_triangles, &of_quads, &of_user].map(Brute::new);
+    let scenes: Result<Vec<Scene>, Error> =
+        (models.iter().filter_map(|model| Some((device?, model))))
+            .map(|(device, model)| Scene::build(device, model, SceneFlags::default()))
+            .collect();
+    let scenes = scenes?;
+    let brutes: Vec<Brute> = primitives.iter().map(Brute::new).collect();
     for query in Query::ALL {
         let rays = plan.rays(query);
         if rays.is_empty() {
             continue;
         }
         // The primitives that the rays start on.
-        let starts: Vec<_> = (rays.iter())
+        let start = |ray: &Ray| trees[0].bvh.closest(ray.org, f32::INFINITY);
+        let starts: Vec<PrimId> = (rays.iter())
             .map(|ray| {
-                let start = trees[0].bvh.closest(ray.org, f32::INFINITY);
-                start.map_or(PrimId::NONE, |start| PrimId {
+                start(ray).map_or(PrimId::NONE, |start| PrimId {
                     prim_id: start.prim_id,
                     geom_id: start.geom_id,
                     inst_id: start.inst_id,
                 })
             })
             .collect();
-        let starts = &starts[..];
-        let mut entries: Vec<Entry> = Vec::new();
-        let mut add = |kind, engine| entries.push(Entry { kind, engine });
-        if let Some(scenes) = &scenes {
-            for (kind, scene) in ["triangles", "quads", "user", "filter"]
-                .into_iter()
-                .zip(scenes)
-            {
-                let variant = Variant::Default;
-                add(kind, Box::new(Rival { scene, variant }) as Box<dyn Engine>);
-            }
+        let mut engines: Vec<(&'static str, Box<dyn Engine + '_>)> = Vec::new();
+        for (kind, scene) in KINDS.into_iter().zip(&scenes) {
+            let variant = Variant::Default;
+            engines.push((kind, Box::new(Rival { scene, variant })));
         }
         for api in [Api::Single, Api::Batch] {
-            for (kind, tree) in ["triangles", "quads", "user"].into_iter().zip(trees) {
-                add(kind, Box::new(Ours { tree, api }));
+            for (kind, tree) in KINDS.into_iter().zip(&trees) {
+                engines.push((kind, Box::new(Ours { tree, api })));
             }
-            for (kind, condition) in [
-                ("closed", Condition::Closed),
-                ("mask", Condition::Mask),
-                ("except", Condition::Except(starts)),
-                ("filter", Condition::Filter),
-                ("visit", Condition::Visit),
-            ] {
-                let all = rays;
-                if condition.has(query, api) {
-                    let tree = &trees[0];
-                    add(
-                        kind,
-                        Box::new(Asked {
-                            tree,
-                            api,
-                            all,
-                            condition,
-                        }),
-                    );
-                }
+            for (kind, condition) in Condition::all(&starts) {
+                let tree = &trees[0];
+                engines.push((
+                    kind,
+                    Box::new(Asked {
+                        tree,
+                        api,
+                        condition,
+                    }),
+                ));
             }
         }
-        // Our answers one by one are right, if brute force says so.
-        let mut references: Vec<(&str, Answers)> = Vec::new();
-        let ours = |entry: &&Entry| entry.engine.label().engine == "antumbra";
-        for entry in entries.iter().filter(ours) {
-            if references.iter().any(|(kind, _)| *kind == entry.kind) {
-                continue;
-            }
-            let Some(mut work) = entry.engine.work(query, rays) else {
-                continue;
-            };
-            work.reset();
-            work.run();
-            let answers = work.answers();
-            let brute = match entry.kind {
-                "quads" => &brutes[1],
-                "user" => &brutes[2],
-                _ => &brutes[0],
-            };
-            let condition =
-                |index: usize| asked::brute(entry.kind, brute, &rays[index], starts[index]);
-            found
-                .checks
-                .push(check(plan, entry.kind, query, &answers, condition));
-            references.push((entry.kind, answers));
-            watch::check(watcher)?;
-        }
-        let reference = |kind: &str| references.iter().find(|(other, _)| *other == kind);
-        let engines: Vec<(&dyn Engine, &Answers)> = (entries.iter())
-            .filter_map(|entry| Some((&*entry.engine, &reference(entry.kind)?.1)))
-            .collect();
-        let outcomes = measure_each(&engines, query, rays, plan.pool, plan.rounds, watcher)?;
-        let count = mesh.indices.len();
-        for (entry, outcome) in entries.iter().zip(&outcomes) {
-            let blank = plan.blank(entry.kind, query.name(), count);
-            let of_kind = |kind: &str, label: super::engine::Label| {
-                let mut all = entries.iter().zip(&outcomes);
-                let found = all.find(|(entry, other)| entry.kind == kind && other.label == label);
-                found.map(|(_, other)| median_ratio(&outcome.seconds, &other.seconds))
-            };
-            found.rows.push(KindRow {
-                ratio_to_embree: of_kind(entry.kind, Rival::REFERENCE),
-                ratio_to_triangles: of_kind("triangles", outcome.label.clone()),
-                ..row(&blank, outcome, rays.len())
-            });
-        }
+        let entries = engines
+            .iter()
+            .filter_map(|(kind, engine)| Entry::of(kind, &**engine, query, rays));
+        let brute = |kind: &str, index: usize| {
+            let place = KINDS[..3].iter().position(|name| *name == kind);
+            let brute = &brutes[place.unwrap_or(0)];
+            asked::brute(kind, brute, &rays[index], starts[index])
+        };
+        let questions = Questions::of(query, mesh.indices.len());
+        case(plan, questions, entries.collect(), brute, found)?;
     }
     Ok(())
 }
@@ -264,30 +276,16 @@ fn row(blank: &KindRow, outcome: &Outcome, count: usize) -> KindRow {
     }
 }
 
-/// Compares answers with brute force, which returns whether anything counts and at which distance the first hit is.
-fn check(
-    plan: &Plan,
-    kind: &'static str,
-    query: Query,
-    answers: &Answers,
-    brute: impl Fn(usize) -> f32,
-) -> Check {
-    let len = match answers {
-        Answers::Occluded(all) => all.len(),
-        Answers::Distances(all) => all.len(),
-    };
-    let count = BRUTE_RAYS.min(len);
-    let wrong = (0..count).map(|turn| turn * len / count).filter(|&index| {
+/// Compares answers with brute force, which returns the distance of the first hit that counts.
+fn disagreements(answers: &Answers, brute: impl Fn(usize) -> f32) -> usize {
+    let count = BRUTE_RAYS.min(answers.len());
+    let places = (0..count).map(|turn| turn * answers.len() / count);
+    let wrong = places.filter(|&index| {
         let t = brute(index);
         match answers {
             Answers::Occluded(all) => all[index] != t.is_finite(),
             Answers::Distances(all) => all[index].to_bits() != t.to_bits(),
         }
     });
-    Check {
-        scene: format!("{}, {kind}", plan.scene),
-        rays: query.name(),
-        ray_count: count,
-        disagreements: wrong.count(),
-    }
+    wrong.count()
 }

@@ -3,210 +3,107 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use antumbra::{Brute, Bvh, Geometry, Primitives, Ray};
+use antumbra::{Brute, Geometry, Primitives};
 
 use super::shapes::Merged;
-use super::{Found, Plan, check, row};
+use super::{Entry, Found, Plan, Questions, case, row};
 use crate::Error;
-use crate::bench::embree::{self, Device, MovingMesh, RayHit, SingleRay};
-use crate::bench::engine::{Answers, Engine, Label, Query, Work};
-use crate::bench::measure::{Outcome, measure_each, median_ratio};
-use crate::bench::ours::{Api, Ours, Tree};
+use crate::bench::Outcome;
+use crate::bench::engine::{Engine, Query};
+use crate::bench::ours::{Api, Ours};
 use crate::bench::record::KindRow;
-use crate::bench::rival::Rival;
-use crate::watch::{self, Watcher};
+use crate::bench::rival::{Rival, Variant};
+use crate::embree::{self, Device, Scene};
+use crate::harness::{interleave, median_ratio};
+use crate::watch;
 
 /// Adds rows: refits on one thread, and rays after a refit.
 pub fn measure(
     plan: &Plan,
     mesh: &Merged,
     device: Option<&Arc<Device>>,
-    watcher: &dyn Watcher,
     found: &mut Found,
 ) -> Result<(), Error> {
     let moved = stirred(mesh);
     let here = [mesh.triangles()];
     let there = [Geometry::triangles(&moved[..], &mesh.indices[..])];
     let mut tree = plan.tree(&Primitives::new(&here)?)?;
-    let labels = [
-        Ours {
-            tree: &tree,
-            api: Api::Single,
-        }
-        .label(),
-        Rival::REFERENCE,
-    ];
-    let engines = if device.is_some() { 2 } else { 1 };
-    let mut outcomes: Vec<_> = labels[..engines]
-        .iter()
-        .map(|label| Outcome {
-            label: label.clone(),
-            seconds: Vec::new(),
-            disagreements: 0,
-        })
-        .collect();
-    for round in 0..=plan.rounds {
-        watch::check(watcher)?;
-        let ours = plan
-            .pool
-            .install(|| refit(&mut tree.bvh, [&there, &here]))?;
-        let mut seconds = vec![ours];
-        if let Some((embree, isa)) = plan.embree.zip(embree::isa(plan.isa.level())) {
+    let ours = Ours {
+        tree: &tree,
+        api: Api::Single,
+    };
+    let labels = [ours.label(), Rival::REFERENCE];
+    let rival = plan.embree.zip(embree::isa(plan.isa.level()));
+    let engines = 1 + usize::from(rival.is_some());
+    let seconds = interleave(plan.rounds, engines, |which| {
+        watch::check(plan.watcher)?;
+        match rival.filter(|_| which == 1) {
+            None => plan.pool.install(|| {
+                let start = Instant::now();
+                tree.bvh.refit(&there)?;
+                tree.bvh.refit(&here)?;
+                Ok::<_, Error>(start.elapsed().as_secs_f64())
+            }),
             // Gone before our next turn: with few threads, one of its scheduler spins as long as it lives.
-            let theirs = || {
-                let device = Device::new(embree, isa, 1)?;
-                let mut moving = MovingMesh::build(&device, &mesh.mesh())?;
+            Some((embree, isa)) => {
+                let device = Device::new(embree, Some(isa), 1)?;
+                let mut moving = Scene::of_moving(&device, &mesh.mesh())?;
                 Ok(moving.refit(&moved)? + moving.refit(&mesh.positions)?)
-            };
-            seconds.push(theirs().map_err(Error::Embree)?);
-        }
-        // The first round warms up.
-        if round > 0 {
-            for (outcome, seconds) in outcomes.iter_mut().zip(seconds) {
-                outcome.seconds.push(seconds);
             }
         }
-    }
+    })?;
     let count = mesh.indices.len();
     let blank = plan.blank("refit", "update", count);
-    let reference = outcomes.get(1).map(|outcome| outcome.seconds.clone());
-    for outcome in &outcomes {
+    for (label, own) in labels.into_iter().zip(&seconds) {
+        let outcome = Outcome {
+            label,
+            seconds: own.clone(),
+            disagreements: 0,
+        };
         found.rows.push(KindRow {
-            ratio_to_embree: (reference.as_ref())
-                .map(|reference| median_ratio(&outcome.seconds, reference)),
+            ratio_to_embree: seconds.get(1).map(|theirs| median_ratio(own, theirs)),
             // Two refits each.
-            ..row(&blank, outcome, 2 * count)
+            ..row(&blank, &outcome, 2 * count)
         });
     }
     tree.bvh.refit(&there)?;
-    let moving = device.map(|device| {
-        let mut moving = MovingMesh::build(device, &mesh.mesh())?;
-        moving.refit(&moved)?;
-        Ok(moving)
-    });
-    let moving = moving.transpose().map_err(Error::Embree)?;
-    rays_after(plan, &tree, moving.as_ref(), &there, watcher, found)
-}
-
-/// Adds rows of rays in refitted trees.
-fn rays_after(
-    plan: &Plan,
-    tree: &Tree,
-    moving: Option<&MovingMesh>,
-    there: &[Geometry<'_>],
-    watcher: &dyn Watcher,
-    found: &mut Found,
-) -> Result<(), Error> {
-    let brute = Brute::new(&Primitives::new(there)?);
+    let moving = match device {
+        Some(device) => {
+            let mut moving = Scene::of_moving(device, &mesh.mesh())?;
+            moving.refit(&moved)?;
+            Some(moving)
+        }
+        None => None,
+    };
+    let brute = Brute::new(&Primitives::new(&there)?);
     let mut engines: Vec<Box<dyn Engine + '_>> = Vec::new();
     for api in [Api::Single, Api::Batch] {
-        engines.push(Box::new(Ours { tree, api }));
+        engines.push(Box::new(Ours { tree: &tree, api }));
     }
-    if let Some(moving) = moving {
-        engines.push(Box::new(Moved(moving)));
+    if let Some(scene) = &moving {
+        let variant = Variant::Default;
+        engines.push(Box::new(Rival { scene, variant }));
     }
     for query in Query::ALL {
         let rays = plan.rays(query);
-        let Some(mut work) = engines[0].work(query, rays).filter(|_| !rays.is_empty()) else {
-            continue;
+        let entry = |engine| Entry::of("refitted", engine, query, rays);
+        let entries = engines.iter().filter_map(|engine| entry(&**engine));
+        let entries: Vec<_> = entries.filter(|_| !rays.is_empty()).collect();
+        let t = |_: &str, index: usize| {
+            let hit = brute.intersect(&rays[index]);
+            hit.map_or(f32::INFINITY, |hit| hit.t)
         };
-        work.reset();
-        work.run();
-        let right = work.answers();
-        let t = |index: usize| {
-            brute
-                .intersect(&rays[index])
-                .map_or(f32::INFINITY, |hit| hit.t)
-        };
-        found.checks.push(check(plan, "refitted", query, &right, t));
-        let each: Vec<_> = engines.iter().map(|engine| (&**engine, &right)).collect();
-        let outcomes = measure_each(&each, query, rays, plan.pool, plan.rounds, watcher)?;
-        let reference = outcomes
-            .iter()
-            .find(|outcome| outcome.label == Rival::REFERENCE);
         let triangles = tree.bvh.report().primitives;
-        for outcome in &outcomes {
-            let blank = plan.blank("refitted", query.name(), triangles);
-            found.rows.push(KindRow {
-                ratio_to_embree: reference
-                    .map(|reference| median_ratio(&outcome.seconds, &reference.seconds)),
-                ..row(&blank, outcome, rays.len())
-            });
-        }
+        case(plan, Questions::of(query, triangles), entries, t, found)?;
     }
     Ok(())
 }
 
-/// Seconds of some refits.
-fn refit(bvh: &mut Bvh, places: [&[Geometry<'_>]; 2]) -> Result<f64, Error> {
-    let start = Instant::now();
-    for place in places {
-        bvh.refit(place)?;
-    }
-    Ok(start.elapsed().as_secs_f64())
-}
-
 /// The positions after a wave of a fiftieth of the scene has passed: neighbours stay neighbours.
 fn stirred(mesh: &Merged) -> Vec<[f32; 3]> {
-    let reach = mesh
-        .positions
-        .iter()
-        .flatten()
-        .fold(0.0f32, |most, x| most.max(x.abs()));
-    let wave = |x: f32| 0.02 * reach * (20.0 * x / reach).sin();
+    let all = mesh.positions.iter().flatten();
+    let extent = all.fold(0.0f32, |most, x| most.max(x.abs()));
+    let wave = |x: f32| 0.02 * extent * (20.0 * x / extent).sin();
     let moved = |[x, y, z]: &[f32; 3]| [x + wave(*y), y + wave(*z), z + wave(*x)];
     mesh.positions.iter().map(moved).collect()
-}
-
-/// Embree's refitted scene as an engine.
-struct Moved<'s>(&'s MovingMesh);
-
-impl Engine for Moved<'_> {
-    fn label(&self) -> Label {
-        Rival::REFERENCE
-    }
-
-    fn work<'a>(&'a self, query: Query, rays: &'a [Ray]) -> Option<Box<dyn Work + 'a>> {
-        let scene = self.0;
-        Some(Box::new(MovedWork {
-            scene,
-            query,
-            rays,
-            single: Vec::new(),
-            hits: Vec::new(),
-        }))
-    }
-}
-
-struct MovedWork<'a> {
-    scene: &'a MovingMesh,
-    query: Query,
-    rays: &'a [Ray],
-    single: Vec<SingleRay>,
-    hits: Vec<RayHit>,
-}
-
-impl Work for MovedWork<'_> {
-    fn reset(&mut self) {
-        self.single = self.rays.iter().map(SingleRay::new).collect();
-        self.hits = self.rays.iter().map(RayHit::new).collect();
-    }
-
-    fn run(&mut self) {
-        match self.query {
-            Query::Occluded => self.scene.occluded(&mut self.single),
-            Query::Intersect => self.scene.intersect(&mut self.hits),
-        }
-    }
-
-    fn answers(&self) -> Answers {
-        match self.query {
-            Query::Occluded => {
-                Answers::Occluded(self.single.iter().map(SingleRay::is_occluded).collect())
-            }
-            Query::Intersect => {
-                Answers::Distances(self.hits.iter().map(RayHit::distance).collect())
-            }
-        }
-    }
 }
