@@ -20,6 +20,7 @@ pub mod format {
     pub const FLOAT4X4_ROW_MAJOR: u32 = 0x9144;
     pub const FLOAT3X4_COLUMN_MAJOR: u32 = 0x9234;
     pub const FLOAT4X4_COLUMN_MAJOR: u32 = 0x9244;
+    /// `RTCQuaternionDecomposition`: scale, skew, shift, rotation, translation.
     pub const QUATERNION: u32 = 0xb001;
 
     /// Bytes of an item; `None` for a format that no supported buffer has.
@@ -78,6 +79,17 @@ pub struct Bounds {
     pub align0: f32,
     pub upper: [f32; 3],
     pub align1: f32,
+}
+
+impl Bounds {
+    pub fn new(lower: [f32; 3], upper: [f32; 3]) -> Self {
+        Self {
+            lower,
+            align0: 0.0,
+            upper,
+            align1: 0.0,
+        }
+    }
 }
 
 /// `RTCRay`.
@@ -227,17 +239,17 @@ pub struct PointArguments {
     pub similarity: f32,
 }
 
-/// `RTCQuaternionDecomposition`.
+/// The ends of `RTCInterpolateArguments` and `RTCInterpolateNArguments`. Null places are left out.
 #[derive(Clone, Copy, Debug)]
-#[repr(C, align(16))]
-pub struct Quaternion {
-    pub scale: [f32; 3],
-    /// Above the diagonal: xy, xz, yz.
-    pub skew: [f32; 3],
-    pub shift: [f32; 3],
-    /// Real part, then i, j, k.
-    pub rotation: [f32; 4],
-    pub translation: [f32; 3],
+#[repr(C)]
+pub struct InterpolateResults {
+    pub p: *mut f32,
+    pub dp_du: *mut f32,
+    pub dp_dv: *mut f32,
+    pub ddp_dudu: *mut f32,
+    pub ddp_dvdv: *mut f32,
+    pub ddp_dudv: *mut f32,
+    pub values: u32,
 }
 
 /// `RTCInterpolateArguments`.
@@ -250,13 +262,7 @@ pub struct InterpolateArguments<G> {
     pub v: f32,
     pub buffer_type: u32,
     pub slot: u32,
-    pub p: *mut f32,
-    pub dp_du: *mut f32,
-    pub dp_dv: *mut f32,
-    pub ddp_dudu: *mut f32,
-    pub ddp_dvdv: *mut f32,
-    pub ddp_dudv: *mut f32,
-    pub values: u32,
+    pub results: InterpolateResults,
 }
 
 /// `RTCInterpolateNArguments`.
@@ -271,13 +277,7 @@ pub struct InterpolateManyArguments<G> {
     pub n: u32,
     pub buffer_type: u32,
     pub slot: u32,
-    pub p: *mut f32,
-    pub dp_du: *mut f32,
-    pub dp_dv: *mut f32,
-    pub ddp_dudu: *mut f32,
-    pub ddp_dvdv: *mut f32,
-    pub ddp_dudv: *mut f32,
-    pub values: u32,
+    pub results: InterpolateResults,
 }
 
 #[cfg(test)]
@@ -296,8 +296,12 @@ mod tests {
         assert_eq!(size_of::<PointQuery>(), 32);
         assert_eq!(size_of::<PointContext>(), 144);
         assert_eq!(size_of::<PointArguments>(), 48);
-        assert_eq!(size_of::<Quaternion>(), 64);
         assert_eq!(size_of::<Arguments>(), 32);
         assert_eq!(offset_of!(UserArguments, geom_id), 44);
+        assert_eq!(offset_of!(InterpolateArguments<()>, buffer_type), 20);
+        assert_eq!(offset_of!(InterpolateArguments<()>, results), 32);
+        assert_eq!(offset_of!(InterpolateManyArguments<()>, buffer_type), 44);
+        assert_eq!(offset_of!(InterpolateManyArguments<()>, results), 56);
+        assert_eq!(size_of::<InterpolateResults>(), 56);
     }
 }

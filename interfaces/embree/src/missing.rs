@@ -2,11 +2,9 @@
 
 use std::ffi::c_void;
 
-use crate::device::Device;
-use crate::failure::{Failure, report};
+use crate::device::{Device, Failure, Handle, report};
 use crate::geometry::Geometry;
-use crate::handle::{Handle, device_of};
-use crate::user::report_to_running;
+use crate::scene::{Scene, report_to_running};
 
 fn unsupported(name: &str) -> Failure {
     Failure::operation(format!("{name} is not supported"))
@@ -16,7 +14,10 @@ fn unsupported(name: &str) -> Failure {
 /// A handle of this library, or null.
 unsafe fn refuse<T: Handle>(name: &str, handle: *const T) -> *const c_void {
     // SAFETY: the caller's handle.
-    report(unsafe { device_of(handle) }, &unsupported(name));
+    report(
+        unsafe { handle.as_ref() }.map(Handle::device),
+        &unsupported(name),
+    );
     std::ptr::null()
 }
 
@@ -50,6 +51,7 @@ macro_rules! missing {
 
 missing! {
     Device: rtcNewBVH;
+    Scene: rtcGetSceneLinearBounds;
     Geometry:
         rtcGetGeometryFace rtcGetGeometryFirstHalfEdge rtcGetGeometryNextHalfEdge rtcGetGeometryOppositeHalfEdge
         rtcGetGeometryPreviousHalfEdge rtcSetGeometryDisplacementFunction rtcSetGeometryMaxRadiusScale

@@ -1,8 +1,16 @@
-//! Geometries: what clients set before a commit. In `buffers`, `functions` and `instance` are the calls that set it.
+//! Geometries: what clients set before a commit.
+//!
+//! `buffer` and `buffers` have memory and what it means, `settings` and `instance` the other calls, `interpolate` attributes.
 
+mod buffer;
 mod buffers;
-mod functions;
+pub mod curves;
+mod filters;
 mod instance;
+mod interpolate;
+mod kind;
+mod settings;
+pub mod transform;
 
 use std::ffi::c_void;
 use std::sync::atomic::{AtomicPtr, AtomicU64, Ordering};
@@ -11,84 +19,12 @@ use std::sync::{Arc, Mutex};
 use crate::abi::{
     BoundsFunction, FilterFunction, IntersectFunction, PointFunction, buffer_type, format,
 };
-use crate::buffer::{Buffer, View};
-use crate::curves::Basis;
-use crate::device::Device;
-use crate::failure::{Failure, Outcome, guarded};
-use crate::handle::{Handle, device_of, give, lock, look, release, retain, share};
+use crate::device::{Device, Failure, Handle, Outcome, give, lock, share};
 use crate::scene::Scene;
-use crate::transform::{self, IDENTITY, Rows};
-
-/// Kinds of geometry that there are here.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Kind {
-    Triangles,
-    Quads,
-    Spheres,
-    Disks,
-    /// Flat curves.
-    Curves(Basis),
-    User,
-    Instance,
-    InstanceArray,
-}
-
-impl Kind {
-    fn new(kind: u32) -> Outcome<Self> {
-        Ok(match kind {
-            0 => Self::Triangles,
-            1 => Self::Quads,
-            50 => Self::Spheres,
-            52 => Self::Disks,
-            120 => Self::User,
-            121 => Self::Instance,
-            122 => Self::InstanceArray,
-            2 => return Err(unsupported("grids")),
-            8 => return Err(unsupported("subdivision surfaces")),
-            51 => return Err(unsupported("discs that face the ray")),
-            17 => Self::Curves(Basis::Linear),
-            25 => Self::Curves(Basis::Bezier),
-            33 => Self::Curves(Basis::BSpline),
-            59 => Self::Curves(Basis::CatmullRom),
-            15 | 16 | 24 | 32 | 40 | 58 => return Err(unsupported("round curves")),
-            26 | 34 | 42 | 60 => return Err(unsupported("curves with normals")),
-            41 => return Err(unsupported("Hermite curves")),
-            _ => {
-                return Err(Failure::argument(format!(
-                    "unknown type of geometry {kind}"
-                )));
-            }
-        })
-    }
-
-    /// Format of the index buffer.
-    fn index_format(self) -> Option<u32> {
-        match self {
-            Self::Triangles => Some(format::UINT3),
-            Self::Quads => Some(format::UINT4),
-            Self::Curves(_) | Self::InstanceArray => Some(format::UINT),
-            _ => None,
-        }
-    }
-
-    /// Format of the vertex buffer.
-    fn vertex_format(self) -> Option<u32> {
-        match self {
-            Self::Triangles | Self::Quads => Some(format::FLOAT3),
-            Self::Spheres | Self::Disks | Self::Curves(_) => Some(format::FLOAT4),
-            _ => None,
-        }
-    }
-
-    /// Kinds whose hits have `u` and `v` on corners.
-    pub fn has_corners(self) -> bool {
-        matches!(self, Self::Triangles | Self::Quads)
-    }
-}
-
-fn unsupported(what: &str) -> Failure {
-    Failure::operation(format!("{what} are not supported"))
-}
+pub use buffer::View;
+pub use filters::{Filters, Query};
+pub use kind::{Basis, Kind};
+use transform::{IDENTITY, Rows};
 
 /// `RTCGeometry`.
 pub struct Geometry {
@@ -101,8 +37,8 @@ pub struct Geometry {
 }
 
 impl Handle for Geometry {
-    fn device(&self) -> Option<&Device> {
-        Some(&self.device)
+    fn device(&self) -> &Device {
+        &self.device
     }
 }
 
@@ -128,8 +64,6 @@ pub struct State {
     pub takes_argument_filter: bool,
     pub scenes: Vec<Option<Arc<Scene>>>,
     pub transform: Rows,
-    /// Whether anything has changed since the geometry was committed.
-    is_modified: bool,
 }
 
 impl State {
@@ -153,7 +87,6 @@ impl State {
             takes_argument_filter: false,
             scenes: Vec::new(),
             transform: IDENTITY,
-            is_modified: true,
         }
     }
 }
@@ -182,21 +115,22 @@ impl Geometry {
         lock(&self.state).transform
     }
 
-    fn change(&self, change: impl FnOnce(&mut State) -> Outcome) -> Outcome {
-        let mut state = lock(&self.state);
-        change(&mut state)?;
-        state.is_modified = true;
+    /// Changes settings.
+    fn set(&self, set: impl FnOnce(&mut State)) -> Outcome {
+        set(&mut lock(&self.state));
         Ok(())
     }
 
-    fn enable(&self, is_enabled: bool) {
-        lock(&self.state).is_enabled = is_enabled;
-        self.committed.fetch_add(1, Ordering::AcqRel);
+    /// Changes settings that only user geometry has.
+    fn set_of_user(&self, set: impl FnOnce(&mut State)) -> Outcome {
+        self.must_be(&[Kind::User], "user geometries")?;
+        self.set(set)
     }
 
-    fn commit(&self) {
-        lock(&self.state).is_modified = false;
+    fn enable(&self, is_enabled: bool) -> Outcome {
+        self.set(|state| state.is_enabled = is_enabled)?;
         self.committed.fetch_add(1, Ordering::AcqRel);
+        Ok(())
     }
 
     fn must_be(&self, kinds: &[Kind], what: &str) -> Outcome {
@@ -211,24 +145,12 @@ impl Geometry {
 
     /// Puts a view where a buffer of this type belongs.
     fn set_view(&self, buffer: u32, slot: u32, which: u32, view: View) -> Outcome {
-        let expect = |format: Option<u32>| match format {
-            None => Err(Failure::argument("unknown buffer type")),
-            Some(format) if format != which => Err(Failure::operation(format!(
-                "format {which:#x} of a buffer should be {format:#x}"
-            ))),
-            Some(_) => Ok(()),
-        };
         if slot != 0 && buffer != buffer_type::VERTEX_ATTRIBUTE {
             return Err(Failure::argument(
                 "invalid buffer slot: motion blur is not supported",
             ));
         }
         match buffer {
-            buffer_type::INDEX => expect(self.kind.index_format())?,
-            buffer_type::VERTEX => expect(self.kind.vertex_format())?,
-            buffer_type::NORMAL => {
-                expect((self.kind == Kind::Disks).then_some(format::FLOAT3))?;
-            }
             buffer_type::TRANSFORM => {
                 self.must_be(&[Kind::InstanceArray], "instance arrays")?;
                 if which < format::FLOAT3X4_ROW_MAJOR {
@@ -245,12 +167,18 @@ impl Geometry {
                     return Err(Failure::operation("invalid format of a vertex attribute"));
                 }
             }
-            _ => return Err(Failure::argument("unknown buffer type")),
+            _ => match self.kind.format(buffer) {
+                None => return Err(Failure::argument("unknown buffer type")),
+                Some(format) if format != which => {
+                    return Err(Failure::operation(format!(
+                        "format {which:#x} of a buffer should be {format:#x}"
+                    )));
+                }
+                Some(_) => {}
+            },
         }
-        self.change(|state| {
-            *state.slot(buffer, slot)? = Some(view);
-            Ok(())
-        })
+        *lock(&self.state).slot(buffer, slot)? = Some(view);
+        Ok(())
     }
 }
 
@@ -290,172 +218,29 @@ impl State {
     }
 }
 
-/// Runs a call on a geometry.
-///
-/// # Safety
-/// A geometry of this library, or null.
-unsafe fn with<T>(
-    geometry: *const Geometry,
-    otherwise: T,
-    call: impl FnOnce(&Geometry) -> Outcome<T>,
-) -> T {
-    // SAFETY: the caller's handle.
-    unsafe { guarded(device_of(geometry), otherwise, || call(look(geometry)?)) }
-}
+exports! {
+    fn rtcNewGeometry(device: Device, kind: u32) -> *const Geometry {
+        Ok(give(Arc::new(Geometry {
+            device: share(device)?,
+            kind: Kind::new(kind)?,
+            user: AtomicPtr::default(),
+            committed: AtomicU64::new(0),
+            state: Mutex::new(State::new()),
+        })))
+    }
 
-/// # Safety
-/// A device of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcNewGeometry(device: *const Device, kind: u32) -> *const Geometry {
-    // SAFETY: the caller's handle.
-    unsafe {
-        guarded(device_of(device), std::ptr::null(), || {
-            Ok(give(Arc::new(Geometry {
-                device: share(device)?,
-                kind: Kind::new(kind)?,
-                user: AtomicPtr::default(),
-                committed: AtomicU64::new(0),
-                state: Mutex::new(State::new()),
-            })))
-        })
+    fn rtcCommitGeometry(geometry: Geometry) {
+        geometry.committed.fetch_add(1, Ordering::AcqRel);
+        Ok(())
+    }
+
+    fn rtcEnableGeometry(geometry: Geometry) {
+        geometry.enable(true)
+    }
+
+    fn rtcDisableGeometry(geometry: Geometry) {
+        geometry.enable(false)
     }
 }
 
-/// # Safety
-/// A geometry of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcRetainGeometry(geometry: *const Geometry) {
-    // SAFETY: the caller's handle.
-    unsafe { guarded(device_of(geometry), (), || retain(geometry)) }
-}
-
-/// # Safety
-/// A geometry of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcReleaseGeometry(geometry: *const Geometry) {
-    // SAFETY: the caller's handle.
-    guarded(None, (), || unsafe { release(geometry) })
-}
-
-/// # Safety
-/// A geometry of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcCommitGeometry(geometry: *const Geometry) {
-    // SAFETY: the caller's handle.
-    unsafe {
-        with(geometry, (), |geometry| {
-            geometry.commit();
-            Ok(())
-        })
-    }
-}
-
-/// # Safety
-/// A geometry of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcEnableGeometry(geometry: *const Geometry) {
-    // SAFETY: the caller's handle.
-    unsafe {
-        with(geometry, (), |geometry| {
-            geometry.enable(true);
-            Ok(())
-        })
-    }
-}
-
-/// # Safety
-/// A geometry of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcDisableGeometry(geometry: *const Geometry) {
-    // SAFETY: the caller's handle.
-    unsafe {
-        with(geometry, (), |geometry| {
-            geometry.enable(false);
-            Ok(())
-        })
-    }
-}
-
-/// # Safety
-/// A geometry of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryTimeStepCount(geometry: *const Geometry, count: u32) {
-    // SAFETY: the caller's handle.
-    unsafe {
-        with(geometry, (), |_| match count {
-            1 => Ok(()),
-            0 | 130.. => Err(Failure::argument("number of time steps is out of range")),
-            _ => Err(unsupported("several time steps")),
-        })
-    }
-}
-
-/// # Safety
-/// A geometry of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryVertexAttributeCount(geometry: *const Geometry, count: u32) {
-    // SAFETY: the caller's handle.
-    unsafe {
-        with(geometry, (), |geometry| {
-            if !geometry.kind.has_corners() || count > 1 << 16 {
-                return Err(Failure::operation(
-                    "no so many attributes for this geometry",
-                ));
-            }
-            geometry.change(|state| {
-                state.attributes.resize(count as usize, None);
-                Ok(())
-            })
-        })
-    }
-}
-
-/// # Safety
-/// A geometry of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryMask(geometry: *const Geometry, mask: u32) {
-    // SAFETY: the caller's handle.
-    unsafe {
-        with(geometry, (), |geometry| {
-            geometry.change(|state| {
-                state.mask = mask;
-                Ok(())
-            })
-        })
-    }
-}
-
-/// Checks the quality, which has no effect: the build quality of the scene decides how trees are built.
-///
-/// # Safety
-/// A geometry of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryBuildQuality(geometry: *const Geometry, quality: u32) {
-    // SAFETY: the caller's handle.
-    unsafe {
-        with(geometry, (), |_| match quality {
-            0..=3 => Ok(()),
-            _ => Err(Failure::argument("invalid build quality")),
-        })
-    }
-}
-
-/// Number of quads of each cubic curve. A linear curve has none.
-///
-/// # Safety
-/// A geometry of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcSetGeometryTessellationRate(geometry: *const Geometry, rate: f32) {
-    // SAFETY: the caller's handle.
-    unsafe {
-        with(geometry, (), |geometry| {
-            if !matches!(geometry.kind, Kind::Curves(_)) {
-                return Err(Failure::operation("operation only allowed for curves"));
-            }
-            geometry.change(|state| {
-                state.tessellation = (rate as u32).clamp(1, 16);
-                Ok(())
-            })
-        })
-    }
-}
+references! { Geometry: rtcRetainGeometry rtcReleaseGeometry }

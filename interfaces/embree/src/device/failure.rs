@@ -5,11 +5,9 @@
 
 use std::any::Any;
 use std::cell::RefCell;
-use std::ffi::{CString, c_char, c_int};
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::ffi::{CString, c_char};
 
 use crate::abi::ErrorCode;
-use crate::device::Device;
 
 /// Why a call fails.
 #[derive(Debug)]
@@ -30,6 +28,15 @@ impl Failure {
     pub fn new(code: ErrorCode, text: impl Into<String>) -> Self {
         let text = text.into();
         Self { code, text }
+    }
+}
+
+impl From<&(dyn Any + Send)> for Failure {
+    /// From what a panic carries.
+    fn from(panic: &(dyn Any + Send)) -> Self {
+        let text = (panic.downcast_ref::<&str>().copied())
+            .or(panic.downcast_ref::<String>().map(String::as_str));
+        Self::new(ErrorCode::Unknown, text.unwrap_or("unknown panic"))
     }
 }
 
@@ -58,36 +65,12 @@ thread_local! {
     static RECORDS: RefCell<Vec<Record>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Runs a call for a device. A failure or a panic is reported, and the call returns `otherwise`.
-#[inline]
-pub fn guarded<T>(device: Option<&Device>, otherwise: T, call: impl FnOnce() -> Outcome<T>) -> T {
-    // What a call holds when it panics is dropped, and locks that are poisoned are opened.
-    match catch_unwind(AssertUnwindSafe(call)) {
-        Ok(Ok(value)) => value,
-        Ok(Err(failure)) => {
-            report(device, &failure);
-            otherwise
-        }
-        Err(panic) => {
-            report(device, &panicked(panic.as_ref()));
-            otherwise
-        }
-    }
-}
-
-fn panicked(panic: &(dyn Any + Send)) -> Failure {
-    let text = (panic.downcast_ref::<&str>().copied())
-        .or(panic.downcast_ref::<String>().map(String::as_str));
-    Failure::new(ErrorCode::Unknown, text.unwrap_or("unknown panic"))
-}
-
-/// Records a failure and calls the error function of the device.
+/// Records a failure of this thread for a device, and returns its text.
 #[cold]
-pub fn report(device: Option<&Device>, failure: &Failure) {
+pub fn record(device: u64, failure: &Failure) -> CString {
     let text = CString::new(failure.text.replace('\0', " ")).unwrap_or_default();
-    let id = device.map_or(0, Device::id);
     RECORDS.with_borrow_mut(|records| {
-        match records.iter_mut().find(|record| record.device == id) {
+        match records.iter_mut().find(|record| record.device == device) {
             Some(record) => {
                 if record.code == ErrorCode::None {
                     record.code = failure.code;
@@ -95,15 +78,13 @@ pub fn report(device: Option<&Device>, failure: &Failure) {
                 record.text.clone_from(&text);
             }
             None => records.push(Record {
-                device: id,
+                device,
                 code: failure.code,
                 text: text.clone(),
             }),
         }
     });
-    if let Some(device) = device {
-        device.call_error_function(failure.code as c_int, &text);
-    }
+    text
 }
 
 /// Takes the code of this thread for a device.

@@ -2,22 +2,16 @@
 
 use antumbra::Hit;
 
+use super::curves::tangent;
 use crate::abi::RtcRay;
-use crate::commit::{Placed, PlacedInstance};
-use crate::curves::tangent;
-use crate::geometry::{Kind, State};
-use crate::query::in_object;
+use crate::geometry::{Kind, State, View};
+use crate::scene::Site;
 
 /// Normal at a hit on geometry that is not the client's own.
-pub fn normal(
-    placed: &Placed,
-    instance: Option<&PlacedInstance>,
-    ray: &RtcRay,
-    hit: &Hit,
-) -> [f32; 3] {
-    let state = &placed.state;
-    let prim = hit.prim_id as usize;
-    match placed.geometry.kind {
+pub fn normal(site: Site<'_>, ray: &RtcRay, hit: &Hit) -> [f32; 3] {
+    let state = site.state();
+    let prim = hit.prim_id;
+    match site.kind() {
         Kind::Triangles => corners::<3>(state, prim).map_or([0.0; 3], of_triangle),
         Kind::Quads => corners::<4>(state, prim).map_or([0.0; 3], |[a, b, c, d]| {
             let is_first = hit.u + hit.v <= 1.0;
@@ -27,18 +21,19 @@ pub fn normal(
             let Some([x, y, z, _]) = item::<4>(state.vertices.as_ref(), prim) else {
                 return [0.0; 3];
             };
-            let (org, dir) = in_object(instance, ray.org, ray.dir);
+            let (org, dir) = site.in_object(ray);
             std::array::from_fn(|axis| org[axis] + hit.t * dir[axis] - [x, y, z][axis])
         }
         Kind::Disks => item(state.normals.as_ref(), prim).unwrap_or([0.0; 3]),
-        Kind::Curves(basis) => tangent(basis, state, hit.prim_id, hit.u),
+        Kind::Curves(basis) => tangent(basis, state, prim, hit.u),
         Kind::User | Kind::Instance | Kind::InstanceArray => [0.0; 3],
     }
 }
 
 /// Corners of a primitive, as the buffers have them now.
 #[inline]
-pub fn corners<const N: usize>(state: &State, prim: usize) -> Option<[[f32; 3]; N]> {
+fn corners<const N: usize>(state: &State, prim: u32) -> Option<[[f32; 3]; N]> {
+    let prim = prim as usize;
     let index = state.index.as_ref().filter(|index| prim < index.count)?;
     let vertices = state.vertices.as_ref()?;
     let indices = index.read::<N, u32>(prim);
@@ -53,9 +48,10 @@ pub fn corners<const N: usize>(state: &State, prim: usize) -> Option<[[f32; 3]; 
     Some(corners)
 }
 
-fn item<const N: usize>(view: Option<&crate::buffer::View>, prim: usize) -> Option<[f32; N]> {
-    view.filter(|view| prim < view.count)
-        .map(|view| view.read(prim))
+/// The first numbers of an item, as the buffer has it now.
+pub fn item<const N: usize>(view: Option<&View>, prim: u32) -> Option<[f32; N]> {
+    let prim = prim as usize;
+    Some(view.filter(|view| prim < view.count)?.read(prim))
 }
 
 fn of_triangle([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {

@@ -5,9 +5,7 @@ use std::ffi::c_void;
 use std::sync::Arc;
 
 use crate::abi::{ErrorCode, format};
-use crate::device::Device;
-use crate::failure::{Failure, Outcome, guarded};
-use crate::handle::{Handle, device_of, give, look, release, retain, share};
+use crate::device::{Device, Failure, Handle, Outcome, give, share};
 
 /// Alignment of memory of the library.
 const ALIGN: usize = 64;
@@ -29,8 +27,8 @@ unsafe impl Send for Buffer {}
 unsafe impl Sync for Buffer {}
 
 impl Handle for Buffer {
-    fn device(&self) -> Option<&Device> {
-        Some(&self.device)
+    fn device(&self) -> &Device {
+        &self.device
     }
 }
 
@@ -184,105 +182,23 @@ pub trait Number: Copy {}
 impl Number for f32 {}
 impl Number for u32 {}
 
-fn new_buffer(device: *const Device, size: usize) -> *const Buffer {
-    // SAFETY: the caller's handle.
-    unsafe {
-        guarded(device_of(device), std::ptr::null(), || {
-            Ok(give(Buffer::new(share(device)?, size)?))
-        })
+exports! {
+    // There is one memory, for the host and the device.
+    fn rtcNewBuffer | rtcNewBufferHostDevice(device: Device, size: usize) -> *const Buffer {
+        Ok(give(Buffer::new(share(device)?, size)?))
+    }
+
+    fn rtcNewSharedBuffer | rtcNewSharedBufferHostDevice(device: Device, memory: *mut c_void, size: usize) -> *const Buffer {
+        Ok(give(Buffer::shared(share(device)?, memory, size)))
+    }
+
+    fn rtcCommitBuffer(_buffer: Buffer) {
+        Ok(())
+    }
+
+    fn rtcGetBufferData | rtcGetBufferDataDevice(buffer: Buffer) -> *mut c_void {
+        Ok(buffer.memory.cast())
     }
 }
 
-fn new_shared(device: *const Device, memory: *mut c_void, size: usize) -> *const Buffer {
-    // SAFETY: the caller's handle.
-    unsafe {
-        guarded(device_of(device), std::ptr::null(), || {
-            Ok(give(Buffer::shared(share(device)?, memory, size)))
-        })
-    }
-}
-
-/// # Safety
-/// A device of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcNewBuffer(device: *const Device, size: usize) -> *const Buffer {
-    new_buffer(device, size)
-}
-
-/// # Safety
-/// A device of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcNewBufferHostDevice(
-    device: *const Device,
-    size: usize,
-) -> *const Buffer {
-    new_buffer(device, size)
-}
-
-/// # Safety
-/// A device of this library, or null; memory that lives as long as the buffer.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcNewSharedBuffer(
-    device: *const Device,
-    memory: *mut c_void,
-    size: usize,
-) -> *const Buffer {
-    new_shared(device, memory, size)
-}
-
-/// # Safety
-/// As [`rtcNewSharedBuffer`].
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcNewSharedBufferHostDevice(
-    device: *const Device,
-    memory: *mut c_void,
-    size: usize,
-) -> *const Buffer {
-    new_shared(device, memory, size)
-}
-
-/// Nothing to copy: there is one memory.
-///
-/// # Safety
-/// A buffer of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcCommitBuffer(buffer: *const Buffer) {
-    // SAFETY: the caller's handle.
-    unsafe { guarded(device_of(buffer), (), || look(buffer).map(|_| ())) }
-}
-
-/// # Safety
-/// A buffer of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetBufferData(buffer: *const Buffer) -> *mut c_void {
-    // SAFETY: the caller's handle.
-    unsafe {
-        guarded(device_of(buffer), std::ptr::null_mut(), || {
-            Ok(look(buffer)?.memory.cast())
-        })
-    }
-}
-
-/// # Safety
-/// A buffer of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcGetBufferDataDevice(buffer: *const Buffer) -> *mut c_void {
-    // SAFETY: as for the other.
-    unsafe { rtcGetBufferData(buffer) }
-}
-
-/// # Safety
-/// A buffer of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcRetainBuffer(buffer: *const Buffer) {
-    // SAFETY: the caller's handle.
-    unsafe { guarded(device_of(buffer), (), || retain(buffer)) }
-}
-
-/// # Safety
-/// A buffer of this library, or null.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcReleaseBuffer(buffer: *const Buffer) {
-    // SAFETY: the caller's handle.
-    guarded(None, (), || unsafe { release(buffer) })
-}
+references! { Buffer: rtcRetainBuffer rtcReleaseBuffer }

@@ -5,13 +5,11 @@ use std::ffi::{c_int, c_void};
 
 use antumbra::ClosestPoint;
 
+use super::curves::own_prim;
 use crate::abi::{PointArguments, PointContext, PointFunction, PointQuery};
-use crate::commit::Committed;
-use crate::curves::own_prim;
-use crate::failure::{Failure, Outcome};
-use crate::handle::look_mut;
-use crate::scene::{Scene, with};
-use crate::transform;
+use crate::device::{Failure, Outcome, look_mut, with};
+use crate::geometry::transform;
+use crate::scene::{Committed, Scene, Traits};
 
 /// Calls functions about every primitive in the radius, which they may shrink. Returns whether one of them did.
 ///
@@ -44,12 +42,12 @@ unsafe fn visit(
     call(&nearest, &mut radius);
     // A curve has several primitives of the kernel.
     let id = |near: &ClosestPoint| {
-        let (placed, _) = committed.find(near.inst_id, near.geom_id);
-        (near.inst_id, near.geom_id, own_prim(placed, near.prim_id))
+        let site = committed.find(near.inst_id, near.geom_id);
+        (near.inst_id, near.geom_id, own_prim(site, near.prim_id))
     };
     let mut called = HashSet::from([id(&nearest)]);
     for near in committed.bvh().within(point, radius) {
-        let is_new = match committed.traits.has_curves {
+        let is_new = match committed.traits.has(Traits::CURVES) {
             true => called.insert(id(&near)),
             false => !called.contains(&id(&near)),
         };
@@ -72,11 +70,11 @@ unsafe fn call(
     function: Option<PointFunction>,
     user: *mut c_void,
 ) -> bool {
-    let (placed, instance) = committed.find(near.inst_id, near.geom_id);
+    let site = committed.find(near.inst_id, near.geom_id);
     // SAFETY: as the caller vouches.
     let before = unsafe { *context };
     let mut similarity = 1.0;
-    if let Some(instance) = instance {
+    if let Some(instance) = site.instance {
         similarity = transform::similarity(&instance.to_world);
         // Embree's scale is that from the world to the object.
         similarity = if similarity > 0.0 {
@@ -98,15 +96,13 @@ unsafe fn call(
             };
         }
     }
-    let functions = [(function, user), (placed.state.point, user)];
     let mut has_changed = false;
-    for (function, user) in functions {
-        let Some(function) = function else { continue };
+    for function in [function, site.state().point].into_iter().flatten() {
         let mut arguments = PointArguments {
             query,
             user,
-            prim_id: own_prim(placed, near.prim_id),
-            geom_id: placed.geom_id,
+            prim_id: own_prim(site, near.prim_id),
+            geom_id: site.placed.geom_id,
             context,
             similarity,
         };
@@ -118,36 +114,16 @@ unsafe fn call(
     has_changed
 }
 
-/// # Safety
-/// A scene of this library, a query and a context, or null ones.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcPointQuery(
-    scene: *const Scene,
-    query: *mut PointQuery,
-    context: *mut PointContext,
-    function: Option<PointFunction>,
-    user: *mut c_void,
-) -> bool {
-    // SAFETY: the caller's handle and memory.
-    unsafe {
-        with(scene, false, |scene| {
-            visit(scene.committed()?, query, context, function, user)
-        })
+exports! {
+    fn rtcPointQuery | rtcTraversablePointQuery(
+        scene: Scene,
+        query: *mut PointQuery,
+        context: *mut PointContext,
+        function: Option<PointFunction>,
+        user: *mut c_void,
+    ) -> bool {
+        visit(scene.committed()?, query, context, function, user)
     }
-}
-
-/// # Safety
-/// As [`rtcPointQuery`].
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn rtcTraversablePointQuery(
-    scene: *const Scene,
-    query: *mut PointQuery,
-    context: *mut PointContext,
-    function: Option<PointFunction>,
-    user: *mut c_void,
-) -> bool {
-    // SAFETY: as for the other.
-    unsafe { rtcPointQuery(scene, query, context, function, user) }
 }
 
 /// Point queries of a packet: x, y, z, time and radius in arrays.
@@ -164,7 +140,7 @@ unsafe fn packet<const N: usize>(
 ) -> bool {
     // SAFETY: the caller's handle and memory.
     unsafe {
-        with(scene, false, |scene| {
+        with(scene, |scene| {
             let committed = scene.committed()?;
             if valid.is_null() || queries.is_null() {
                 return Err(Failure::argument("a pointer is null"));

@@ -2,8 +2,8 @@
 
 use std::ffi::c_void;
 
-use crate::abi::{Quaternion, format};
-use crate::failure::{Failure, Outcome};
+use crate::abi::format;
+use crate::device::{Failure, Outcome};
 
 /// Three rows of an affine matrix, translation last.
 pub type Rows = [[f32; 4]; 3];
@@ -14,27 +14,26 @@ pub const IDENTITY: Rows = [
     [0.0, 0.0, 1.0, 0.0],
 ];
 
+/// Distances between rows and between columns of a matrix in one of the formats.
+fn strides(which: u32) -> Option<[usize; 2]> {
+    Some(match which {
+        format::FLOAT3X4_ROW_MAJOR | format::FLOAT4X4_ROW_MAJOR => [4, 1],
+        format::FLOAT3X4_COLUMN_MAJOR => [1, 3],
+        format::FLOAT4X4_COLUMN_MAJOR => [1, 4],
+        _ => return None,
+    })
+}
+
 /// From numbers in one of the formats, which has as many.
 pub fn from_numbers(which: u32, numbers: &[f32]) -> Outcome<Rows> {
-    Ok(match which {
-        format::FLOAT3X4_ROW_MAJOR | format::FLOAT4X4_ROW_MAJOR => {
-            std::array::from_fn(|row| std::array::from_fn(|column| numbers[4 * row + column]))
-        }
-        format::FLOAT3X4_COLUMN_MAJOR => {
-            std::array::from_fn(|row| std::array::from_fn(|column| numbers[3 * column + row]))
-        }
-        format::FLOAT4X4_COLUMN_MAJOR => {
-            std::array::from_fn(|row| std::array::from_fn(|column| numbers[4 * column + row]))
-        }
-        format::QUATERNION => from_quaternion(&Quaternion {
-            scale: [numbers[0], numbers[1], numbers[2]],
-            skew: [numbers[3], numbers[4], numbers[5]],
-            shift: [numbers[6], numbers[7], numbers[8]],
-            rotation: [numbers[9], numbers[10], numbers[11], numbers[12]],
-            translation: [numbers[13], numbers[14], numbers[15]],
-        }),
-        _ => return Err(unknown(which)),
-    })
+    let at = |place: usize| numbers[place];
+    match strides(which) {
+        Some([rows, columns]) => Ok(std::array::from_fn(|row| {
+            std::array::from_fn(|column| at(row * rows + column * columns))
+        })),
+        None if which == format::QUATERNION => Ok(from_quaternion(std::array::from_fn(at))),
+        None => Err(unknown(which)),
+    }
 }
 
 /// From memory of the client.
@@ -58,23 +57,19 @@ pub unsafe fn read(which: u32, memory: *const c_void) -> Outcome<Rows> {
 ///
 /// # Safety
 /// The memory has room for the format.
-pub unsafe fn write(rows: &Rows, which: u32, memory: *mut c_void) -> Outcome {
+pub unsafe fn write(matrix: &Rows, which: u32, memory: *mut c_void) -> Outcome {
     if memory.is_null() {
         return Err(Failure::argument("a transform is null"));
     }
-    let last = [0.0, 0.0, 0.0, 1.0];
-    let at = |row: usize, column: usize| rows.get(row).map_or(last[column], |row| row[column]);
-    let numbers: Vec<f32> = match which {
-        format::FLOAT3X4_ROW_MAJOR => (0..12).map(|n| at(n / 4, n % 4)).collect(),
-        format::FLOAT4X4_ROW_MAJOR => (0..16).map(|n| at(n / 4, n % 4)).collect(),
-        format::FLOAT3X4_COLUMN_MAJOR => (0..12).map(|n| at(n % 3, n / 3)).collect(),
-        format::FLOAT4X4_COLUMN_MAJOR => (0..16).map(|n| at(n % 4, n / 4)).collect(),
-        _ => return Err(unknown(which)),
-    };
-    for (index, number) in numbers.into_iter().enumerate() {
-        let place = memory.cast::<f32>().wrapping_add(index);
-        // SAFETY: the caller vouches for the room.
-        unsafe { place.write_unaligned(number) };
+    let [rows, columns] = strides(which).ok_or_else(|| unknown(which))?;
+    let count = format::size(which).unwrap_or(0) / 4;
+    for (place, number) in self::columns(matrix).into_iter().enumerate() {
+        let (row, column) = (place % 4, place / 4);
+        if row < count / 4 {
+            let place = (memory.cast::<f32>()).wrapping_add(row * rows + column * columns);
+            // SAFETY: the caller vouches for the room.
+            unsafe { place.write_unaligned(number) };
+        }
     }
     Ok(())
 }
@@ -84,12 +79,11 @@ fn unknown(which: u32) -> Failure {
 }
 
 /// Translation after rotation after scale, skew and shift, as Embree documents them.
-fn from_quaternion(parts: &Quaternion) -> Rows {
-    let [sx, sy, sz] = parts.scale.map(f64::from);
-    let [xy, xz, yz] = parts.skew.map(f64::from);
-    let [x, y, z] = parts.shift.map(f64::from);
+///
+/// The numbers are scale, skew (xy, xz, yz), shift, rotation (real part first) and translation.
+fn from_quaternion(numbers: [f32; 16]) -> Rows {
+    let [sx, sy, sz, xy, xz, yz, x, y, z, r, i, j, k, tx, ty, tz] = numbers.map(f64::from);
     let inner = [[sx, xy, xz, x], [0.0, sy, yz, y], [0.0, 0.0, sz, z]];
-    let [r, i, j, k] = parts.rotation.map(f64::from);
     let rotation = [
         [
             r * r + i * i - j * j - k * k,
@@ -110,11 +104,7 @@ fn from_quaternion(parts: &Quaternion) -> Rows {
     std::array::from_fn(|row| {
         std::array::from_fn(|column| {
             let turned: f64 = (0..3).map(|n| rotation[row][n] * inner[n][column]).sum();
-            let moved = if column == 3 {
-                f64::from(parts.translation[row])
-            } else {
-                0.0
-            };
+            let moved = if column == 3 { [tx, ty, tz][row] } else { 0.0 };
             (turned + moved) as f32
         })
     })

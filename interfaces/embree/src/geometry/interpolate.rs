@@ -1,11 +1,8 @@
 //! Interpolation of vertices and vertex attributes over triangles and quads.
 
-use std::ffi::c_int;
-
-use crate::abi::{InterpolateArguments, InterpolateManyArguments};
-use crate::failure::{Failure, Outcome, guarded};
-use crate::geometry::{Geometry, Kind, State};
-use crate::handle::{device_of, look};
+use super::{Geometry, Kind, State, View};
+use crate::abi::{InterpolateArguments, InterpolateManyArguments, InterpolateResults};
+use crate::device::{Failure, Outcome, with};
 
 /// Weights of three corners, and of their derivatives by `u` and `v`.
 struct Weights {
@@ -13,17 +10,6 @@ struct Weights {
     value: [f32; 3],
     by_u: [f32; 3],
     by_v: [f32; 3],
-}
-
-/// Where results go. Null places are left out.
-struct Places {
-    value: *mut f32,
-    by_u: *mut f32,
-    by_v: *mut f32,
-    /// Second derivatives, which are 0 on flat primitives.
-    second: [*mut f32; 3],
-    /// Distance between numbers of one result.
-    stride: usize,
 }
 
 fn weights(kind: Kind, state: &State, prim: u32, u: f32, v: f32) -> Outcome<Weights> {
@@ -66,18 +52,18 @@ fn weights(kind: Kind, state: &State, prim: u32, u: f32, v: f32) -> Outcome<Weig
     })
 }
 
-/// Writes `count` numbers of one point.
+/// Writes the results of the `index`th of `n` points.
 ///
 /// # Safety
-/// The places have room.
+/// The places are null or have room.
 unsafe fn interpolate(
-    (kind, state): (Kind, &State),
-    (buffer_type, slot): (u32, u32),
+    kind: Kind,
+    state: &State,
+    view: &View,
     (prim, u, v): (u32, f32, f32),
-    count: usize,
-    places: &Places,
+    results: &InterpolateResults,
+    (index, n): (usize, usize),
 ) -> Outcome {
-    let view = state.view(buffer_type, slot)?;
     let weights = weights(kind, state, prim, u, v)?;
     if weights.corners.iter().any(|corner| *corner >= view.count) {
         return Err(Failure::argument(
@@ -85,21 +71,22 @@ unsafe fn interpolate(
         ));
     }
     let [a, b, c] = weights.corners.map(|corner| view.numbers(corner));
-    let numbers = a.zip(b).zip(c).take(count);
+    let numbers = a.zip(b).zip(c).take(results.values as usize);
     for (number, ((a, b), c)) in numbers.enumerate() {
         let sum = |[x, y, z]: [f32; 3]| x * a + y * b + z * c;
-        let results = [
-            (places.value, sum(weights.value)),
-            (places.by_u, sum(weights.by_u)),
-            (places.by_v, sum(weights.by_v)),
-            (places.second[0], 0.0),
-            (places.second[1], 0.0),
-            (places.second[2], 0.0),
+        // Second derivatives are 0 on flat primitives.
+        let answers = [
+            (results.p, sum(weights.value)),
+            (results.dp_du, sum(weights.by_u)),
+            (results.dp_dv, sum(weights.by_v)),
+            (results.ddp_dudu, 0.0),
+            (results.ddp_dvdv, 0.0),
+            (results.ddp_dudv, 0.0),
         ];
-        for (place, result) in results {
+        for (place, answer) in answers {
             if !place.is_null() {
                 // SAFETY: as the caller vouches.
-                unsafe { place.add(number * places.stride).write(result) };
+                unsafe { place.add(number * n + index).write(answer) };
             }
         }
     }
@@ -115,22 +102,16 @@ pub unsafe extern "C" fn rtcInterpolate(arguments: *const InterpolateArguments<G
         let Some(given) = arguments.as_ref() else {
             return;
         };
-        guarded(device_of(given.geometry), (), || {
-            let geometry = look(given.geometry)?;
-            let places = Places {
-                value: given.p,
-                by_u: given.dp_du,
-                by_v: given.dp_dv,
-                second: [given.ddp_dudu, given.ddp_dvdv, given.ddp_dudv],
-                stride: 1,
-            };
-            interpolate(
-                (geometry.kind, &geometry.state()),
-                (given.buffer_type, given.slot),
-                (given.prim_id, given.u, given.v),
-                given.values as usize,
-                &places,
-            )
+        rtcInterpolateN(&InterpolateManyArguments {
+            geometry: given.geometry,
+            valid: std::ptr::null(),
+            prim_ids: &raw const given.prim_id,
+            u: &raw const given.u,
+            v: &raw const given.v,
+            n: 1,
+            buffer_type: given.buffer_type,
+            slot: given.slot,
+            results: given.results,
         });
     }
 }
@@ -144,36 +125,24 @@ pub unsafe extern "C" fn rtcInterpolateN(arguments: *const InterpolateManyArgume
         let Some(given) = arguments.as_ref() else {
             return;
         };
-        guarded(device_of(given.geometry), (), || {
-            let geometry = look(given.geometry)?;
+        with(given.geometry, |geometry| {
             let state = geometry.state();
-            let is_active = |index: usize| {
-                given.valid.is_null() || *given.valid.cast::<c_int>().add(index) == -1
-            };
-            for index in (0..given.n as usize).filter(|index| is_active(*index)) {
-                let at = |place: *mut f32| match place.is_null() {
-                    true => place,
-                    false => place.add(index),
-                };
-                let places = Places {
-                    value: at(given.p),
-                    by_u: at(given.dp_du),
-                    by_v: at(given.dp_dv),
-                    second: [given.ddp_dudu, given.ddp_dvdv, given.ddp_dudv].map(at),
-                    stride: given.n as usize,
-                };
+            let n = given.n as usize;
+            let is_active = |index: &usize| given.valid.is_null() || *given.valid.add(*index) == -1;
+            for index in (0..n).filter(is_active) {
                 let point = (
                     *given.prim_ids.add(index),
                     *given.u.add(index),
                     *given.v.add(index),
                 );
-                let source = (given.buffer_type, given.slot);
+                let view = state.view(given.buffer_type, given.slot)?;
                 interpolate(
-                    (geometry.kind, &state),
-                    source,
+                    geometry.kind,
+                    &state,
+                    view,
                     point,
-                    given.values as usize,
-                    &places,
+                    &given.results,
+                    (index, n),
                 )?;
             }
             Ok(())

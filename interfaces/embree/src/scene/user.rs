@@ -12,15 +12,13 @@ use std::sync::Arc;
 use antumbra::shapes::{UserGeometry, UserHit};
 use antumbra::{Aabb, Ray};
 
+use super::committed::Placed;
 use crate::abi::{
-    Bounds, BoundsArguments, BoundsFunction, Context, FilterArguments, INVALID, IntersectFunction,
-    RtcHit, RtcRay, RtcRayHit, UserArguments,
+    Bounds, BoundsArguments, Context, FilterArguments, INVALID, IntersectFunction, RtcHit, RtcRay,
+    RtcRayHit, UserArguments,
 };
-use crate::commit::Placed;
-use crate::failure::{Failure, report};
-use crate::filter::{Filters, Query};
-use crate::geometry::Geometry;
-use crate::handle::Handle;
+use crate::device::{Failure, Handle, report};
+use crate::geometry::{Filters, Geometry, Query};
 
 /// A query that is running.
 pub struct Current<'a> {
@@ -63,7 +61,7 @@ thread_local! {
 pub fn report_to_running(failure: &Failure) {
     // SAFETY: `UserShape::call` keeps the geometry alive while its function runs.
     let geometry = unsafe { RUNNING.get().as_ref() };
-    report(geometry.and_then(Geometry::device), failure);
+    report(geometry.map(Geometry::device), failure);
 }
 
 /// Runs a query while functions can see it.
@@ -79,38 +77,13 @@ pub fn with_current<T>(current: &Current<'_>, query: impl FnOnce() -> T) -> T {
     query()
 }
 
-/// Functions of a user geometry.
-pub struct UserShape {
-    geometry: Arc<Geometry>,
-    geom_id: u32,
-    bounds: Option<BoundsFunction>,
-    intersect: Option<IntersectFunction>,
-    occluded: Option<IntersectFunction>,
-    intersect_filter: Option<crate::abi::FilterFunction>,
-    occluded_filter: Option<crate::abi::FilterFunction>,
-    takes_argument_filter: bool,
-}
-
-impl UserShape {
-    pub fn new(placed: &Placed) -> Self {
-        let state = &placed.state;
-        Self {
-            geometry: Arc::clone(&placed.geometry),
-            geom_id: placed.geom_id,
-            bounds: state.bounds,
-            intersect: state.intersect,
-            occluded: state.occluded,
-            intersect_filter: state.intersect_filter,
-            occluded_filter: state.occluded_filter,
-            takes_argument_filter: state.takes_argument_filter,
-        }
-    }
-}
+/// A user geometry, whose functions are called.
+pub struct UserShape(pub Placed);
 
 impl fmt::Debug for UserShape {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("UserShape")
-            .field("geom_id", &self.geom_id)
+            .field("geom_id", &self.0.geom_id)
             .finish_non_exhaustive()
     }
 }
@@ -119,7 +92,7 @@ impl fmt::Debug for UserShape {
 #[repr(C)]
 struct Call<'a> {
     arguments: UserArguments,
-    shape: &'a UserShape,
+    placed: &'a Placed,
     current: &'a Current<'a>,
 }
 
@@ -131,6 +104,7 @@ impl UserShape {
         prim_id: u32,
         ray: &Ray,
     ) -> Option<RtcRayHit> {
+        let Self(placed) = self;
         // SAFETY: `with_current` keeps the value alive while queries run. Null while a tree is built.
         let current: &Current<'_> = unsafe { CURRENT.get().cast::<Current<'_>>().as_ref()? };
         let function = current.function.or(function)?;
@@ -146,17 +120,17 @@ impl UserShape {
         let call = Call {
             arguments: UserArguments {
                 valid: &raw mut valid,
-                user: self.geometry.user(),
+                user: placed.geometry.user(),
                 prim_id,
                 context: current.context,
                 ray: (&raw mut rayhit).cast(),
                 n: 1,
-                geom_id: self.geom_id,
+                geom_id: placed.geom_id,
             },
-            shape: self,
+            placed,
             current,
         };
-        let before = RUNNING.replace(Arc::as_ptr(&self.geometry));
+        let before = RUNNING.replace(Arc::as_ptr(&placed.geometry));
         // SAFETY: the client's function, with arguments as documented; `Call` begins with them.
         unsafe { function((&raw const call).cast()) };
         RUNNING.set(before);
@@ -166,15 +140,10 @@ impl UserShape {
 
 impl UserGeometry for UserShape {
     fn bounds(&self, prim_id: u32) -> Aabb {
-        let mut bounds = Bounds {
-            lower: [f32::INFINITY; 3],
-            align0: 0.0,
-            upper: [f32::NEG_INFINITY; 3],
-            align1: 0.0,
-        };
-        if let Some(function) = self.bounds {
+        let mut bounds = Bounds::new([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+        if let Some(function) = self.0.state.bounds {
             let arguments = BoundsArguments {
-                user: self.geometry.user(),
+                user: self.0.geometry.user(),
                 prim_id,
                 time_step: 0,
                 bounds: &raw mut bounds,
@@ -188,17 +157,17 @@ impl UserGeometry for UserShape {
     fn intersect(&self, prim_id: u32, ray: &Ray) -> Option<UserHit> {
         // SAFETY: as in `call`.
         let current: &Current<'_> = unsafe { CURRENT.get().cast::<Current<'_>>().as_ref()? };
-        if current.filters.query() == Query::Occluded {
+        if current.filters.query == Query::Occluded {
             // Anywhere: the kernel moves the distance into the box.
             let anywhere = UserHit::new(current.ray.tnear.max(0.0), 0.0, 0.0);
             return self.occluded(prim_id, ray).then_some(anywhere);
         }
-        let found = self.call(self.intersect, prim_id, ray)?;
+        let found = self.call(self.0.state.intersect, prim_id, ray)?;
         if found.hit.geom_id == INVALID {
             return None;
         }
         current.hits.borrow_mut().push(Reported {
-            geometry: Arc::as_ptr(&self.geometry),
+            geometry: Arc::as_ptr(&self.0.geometry),
             t: found.ray.tfar,
             hit: RtcHit {
                 prim_id,
@@ -209,7 +178,7 @@ impl UserGeometry for UserShape {
     }
 
     fn occluded(&self, prim_id: u32, ray: &Ray) -> bool {
-        (self.call(self.occluded, prim_id, ray))
+        (self.call(self.0.state.occluded, prim_id, ray))
             .is_some_and(|found| found.ray.tfar == f32::NEG_INFINITY)
     }
 
@@ -234,20 +203,35 @@ impl UserGeometry for UserShape {
         };
         let corners: [[f64; 3]; 8] = std::array::from_fn(corner);
         Some(std::array::from_fn(|axis| {
-            let low = corners
-                .iter()
-                .map(|c| c[axis])
-                .fold(f64::INFINITY, f64::min);
-            let high = corners
-                .iter()
-                .map(|c| c[axis])
-                .fold(f64::NEG_INFINITY, f64::max);
+            let along = || corners.iter().map(|corner| corner[axis]);
+            let low = along().fold(f64::INFINITY, f64::min);
+            let high = along().fold(f64::NEG_INFINITY, f64::max);
             point[axis].max(low).min(high)
         }))
     }
 }
 
-/// Runs the filters of the geometry whose function calls. A hit that is accepted is written behind the ray.
+/// Runs the filters of the geometry whose function calls, and returns whether all accept.
+///
+/// # Safety
+/// Arguments that a function of this library was called with, and arguments of a filter for one ray.
+unsafe fn filters_accept(
+    query: Query,
+    arguments: *const UserArguments,
+    filter: *const FilterArguments,
+) -> bool {
+    // SAFETY: functions are only called with a `Call`.
+    unsafe {
+        let call = &*arguments.cast::<Call<'_>>();
+        let filters = call.current.filters.of_query(query);
+        filters.of(&call.placed.state).all(|function| {
+            function(filter);
+            *(*filter).valid != 0
+        })
+    }
+}
+
+/// A hit that is accepted is written behind the ray.
 ///
 /// # Safety
 /// Arguments that a function of this library was called with, and arguments of a filter for one ray.
@@ -256,29 +240,15 @@ pub unsafe extern "C" fn rtcInvokeIntersectFilterFromGeometry(
     arguments: *const UserArguments,
     filter: *const FilterArguments,
 ) {
-    // SAFETY: functions are only called with a `Call`.
+    // SAFETY: as the caller vouches.
     unsafe {
-        let call = &*arguments.cast::<Call<'_>>();
-        let shape = call.shape;
-        let filters = [
-            shape.intersect_filter,
-            call.current
-                .filters
-                .of_arguments(shape.takes_argument_filter),
-        ];
-        for function in filters.into_iter().flatten() {
-            function(filter);
-            if *(*filter).valid == 0 {
-                return;
-            }
+        if filters_accept(Query::Intersect, arguments, filter) {
+            let rayhit = &mut *(*filter).ray.cast::<RtcRayHit>();
+            rayhit.hit = *(*filter).hit.cast::<RtcHit>();
         }
-        let rayhit = &mut *(*filter).ray.cast::<RtcRayHit>();
-        rayhit.hit = *(*filter).hit.cast::<RtcHit>();
     }
 }
 
-/// Runs the filters of the geometry whose function calls.
-///
 /// # Safety
 /// As for the other.
 #[unsafe(no_mangle)]
@@ -286,21 +256,6 @@ pub unsafe extern "C" fn rtcInvokeOccludedFilterFromGeometry(
     arguments: *const UserArguments,
     filter: *const FilterArguments,
 ) {
-    // SAFETY: functions are only called with a `Call`.
-    unsafe {
-        let call = &*arguments.cast::<Call<'_>>();
-        let shape = call.shape;
-        let filters = [
-            shape.occluded_filter,
-            call.current
-                .filters
-                .of_arguments(shape.takes_argument_filter),
-        ];
-        for function in filters.into_iter().flatten() {
-            function(filter);
-            if *(*filter).valid == 0 {
-                return;
-            }
-        }
-    }
+    // SAFETY: as the caller vouches.
+    unsafe { filters_accept(Query::Occluded, arguments, filter) };
 }
