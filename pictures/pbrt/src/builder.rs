@@ -2,11 +2,12 @@
 //!
 //! - this file: the state of a builder, its beginning and its end, and which method handles which directive
 //! - `blocks`: sections of the file and blocks;  `transforms`: current transformations and the camera
-//! - `shapes`: shapes with their materials;  `textures`: textures and their images;  `media`: media by name
+//! - `shapes`: shapes with their materials;  `textures`: textures and their images;  `lights`: lights;  `media`: media by name
 //! - `objects`: objects and their instances;  `later`: names that pbrt-v4 looks up when a file ends
 
 mod blocks;
 mod later;
+mod lights;
 mod media;
 mod objects;
 mod shapes;
@@ -22,16 +23,16 @@ use antumbra_scene::{
 };
 use glam::{DMat4, DVec3};
 
+use crate::arguments::Matrix;
 use crate::budget::Budget;
-use crate::directive::{Directive, Handler};
+use crate::directive::{Directive, Handler, Phase};
 use crate::mesh_file::PendingMeshes;
 use crate::report::Report;
 use crate::source::Span;
-use crate::state::{BlockKind, State, Transforms};
+use crate::state::{BlockKind, State};
 use crate::texture::Images;
 use crate::version4;
-use crate::{Options, Times, film, light, material, parts, settings, texture, transform};
-use blocks::Phase;
+use crate::{Options, Times, film, light, material, parts, settings, texture};
 
 /// Message for a singular transformation. [`SINGULAR_HELP`] names the most frequent reason.
 const SINGULAR: &str = "the current transformation cannot be inverted";
@@ -204,44 +205,42 @@ impl<'o> Builder<'o> {
     }
 }
 
+impl Builder<'_> {
+    /// Translates a directive of pbrt-v4, and defines the textures before it. False: it is not allowed here, which was
+    /// reported.
+    fn prepare(&mut self, at: Span, directive: &mut Directive, report: &mut Report) -> bool {
+        if self.is_version4 {
+            version4::fill(directive, &self.state);
+            if let Directive::Camera(_, params) = directive {
+                self.exposure = version4::exposure(params, at, report);
+            }
+            version4::translate(directive, report);
+        }
+        if !self.check_phase(at, directive, report) {
+            return false;
+        }
+        if !matches!(directive, Directive::Texture(..)) {
+            self.define_textures(report);
+        }
+        true
+    }
+}
+
 impl Handler for Builder<'_> {
     fn directive(&mut self, at: Span, mut directive: Directive, report: &mut Report) {
         use Directive as D;
-        if self.is_version4 {
-            version4::fill(&mut directive, &self.state);
-            if let D::Camera(_, params) = &directive {
-                self.exposure = version4::exposure(params, at, report);
-            }
-            version4::translate(&mut directive, report);
-        }
-        if !self.check_phase(at, &directive, report) {
+        if !self.prepare(at, &mut directive, report) {
             return;
         }
-        if !matches!(directive, D::Texture { .. }) {
-            self.define_textures(report);
-        }
         match directive {
-            D::Identity => self.transforms().change(|_| DMat4::IDENTITY),
+            D::Identity() => self.transforms().change(|_| DMat4::IDENTITY),
             D::Translate(by) => self.concat(DMat4::from_translation(by.into())),
             D::Scale(by) => self.concat(DMat4::from_scale(DVec3::from(by))),
-            D::Rotate(by) => match transform::rotate(by) {
-                Some(matrix) => self.concat(matrix),
-                None => report.error(at, "the axis of the rotation has no length"),
-            },
-            D::LookAt(numbers) => match transform::look_at(numbers) {
-                Some(matrix) => self.concat(matrix),
-                None => report.error_help(
-                    at,
-                    "the LookAt has no direction",
-                    "eye and target must differ, and up must not point along the view",
-                ),
-            },
-            D::Transform(m) => self.transforms().change(|_| DMat4::from_cols_array(&m)),
-            D::ConcatTransform(m) => self.concat(DMat4::from_cols_array(&m)),
-            D::CoordinateSystem(name) => {
-                let Transforms { start, end, .. } = self.state.now.transforms;
-                self.coordinate_systems.insert(name.text, [start, end]);
-            }
+            D::Rotate(by) => self.rotate(at, by, report),
+            D::LookAt(numbers) => self.look_at(at, numbers, report),
+            D::Transform(Matrix(m)) => self.transforms().change(|_| DMat4::from_cols_array(&m)),
+            D::ConcatTransform(Matrix(m)) => self.concat(DMat4::from_cols_array(&m)),
+            D::CoordinateSystem(name) => self.coordinate_system(name),
             D::CoordSysTransform(name) => self.coord_sys_transform(&name, report),
             D::ActiveTransform(active) => self.transforms().active = active,
             D::TransformTimes(times) => self.transform_times(at, times, report),
@@ -263,40 +262,19 @@ impl Handler for Builder<'_> {
                 self.accelerator =
                     settings::declare_accelerator(at, &kind, &params, orders, report);
             }
-            D::WorldBegin => self.world_begin(),
-            D::WorldEnd => self.world_end(report),
-            D::AttributeBegin => self.begin_block(BlockKind::Attribute, at, report),
-            D::AttributeEnd => self.end_block(BlockKind::Attribute, at, report),
-            D::TransformBegin => self.begin_block(BlockKind::Transform, at, report),
-            D::TransformEnd => self.end_block(BlockKind::Transform, at, report),
+            D::WorldBegin() => self.world_begin(),
+            D::WorldEnd() => self.world_end(report),
+            D::AttributeBegin() => self.begin_block(BlockKind::Attribute, at, report),
+            D::AttributeEnd() => self.end_block(BlockKind::Attribute, at, report),
+            D::TransformBegin() => self.begin_block(BlockKind::Transform, at, report),
+            D::TransformEnd() => self.end_block(BlockKind::Transform, at, report),
             D::ObjectBegin(name) => self.object_begin(at, name, report),
-            D::ObjectEnd => self.end_block(BlockKind::Object, at, report),
+            D::ObjectEnd() => self.end_block(BlockKind::Object, at, report),
             D::ObjectInstance(name) => self.object_instance(at, &name, report),
             D::MakeNamedMedium(name, params) => self.named_medium(at, name, &params, report),
-            D::MediumInterface { inside, outside } => {
-                self.state.now.media =
-                    [inside, outside].map(|name| (!name.text.is_empty()).then(|| Arc::new(name)));
-            }
-            D::Texture {
-                name,
-                value_type,
-                class,
-                params,
-            } => {
-                if self.transforms().is_animated() {
-                    report.note(
-                        at,
-                        "textures do not move: the transformation at the start is taken",
-                    );
-                }
-                self.pending_textures.push(texture::Declaration {
-                    at,
-                    name,
-                    value_type,
-                    class,
-                    params,
-                    space: self.texture_space(),
-                });
+            D::MediumInterface(inside, outside) => self.medium_interface(inside, outside),
+            D::Texture(name, value_type, class, params) => {
+                self.texture(at, [name, value_type, class], params, report);
             }
             D::Attribute(group, params) => {
                 version4::attribute(group, params, &mut self.state, report);
@@ -318,23 +296,14 @@ impl Handler for Builder<'_> {
                 self.state.named_materials.define(name.text, Arc::new(spec));
             }
             D::NamedMaterial(name) => self.named_material(&name, report),
-            D::LightSource(kind, params) => {
-                let mut transforms = self.state.now.transforms;
-                let Transforms { start, end, .. } = transforms;
-                transforms.set([start, end].map(|matrix| self.to_origin(matrix)));
-                self.images.allowed = self.budget.left(report);
-                let images = &mut self.images;
-                let light = light::declare(at, &kind, &params, &transforms, images, report);
-                let bytes = size_of::<Light>() as u64 + self.images.newly_used();
-                if self.budget.take(bytes, at, report) {
-                    self.lights.extend(light);
-                }
-            }
+            D::LightSource(kind, params) => self.light(at, &kind, &params, report),
             D::AreaLightSource(kind, params) => {
                 self.state.now.area_light = light::declare_area(at, &kind, &params, report);
             }
             D::Shape(kind, params) => self.shape(at, &kind, &params, report),
-            D::ReverseOrientation => self.state.now.reverse_orientation ^= true,
+            D::ReverseOrientation() => self.state.now.reverse_orientation ^= true,
+            // The parser follows them.
+            D::Include(_) | D::Import(_) => {}
         }
     }
 }

@@ -1,5 +1,6 @@
-//! Directives of pbrt-v3, and the [`Handler`] that receives them from the parser.
+//! Directives of pbrt, and the [`Handler`] that receives them from the parser.
 
+use crate::arguments::{Argument, Arguments, Failed, Matrix};
 use crate::params::Params;
 use crate::report::Report;
 use crate::source::Span;
@@ -19,89 +20,116 @@ pub(crate) enum ActiveTransform {
     EndTime,
 }
 
-/// Directive with its arguments. `Include` is missing, because the parser follows it.
-#[derive(Debug)]
-pub(crate) enum Directive {
-    Accelerator(Quoted, Params),
-    ActiveTransform(ActiveTransform),
-    AreaLightSource(Quoted, Params),
-    /// Values of parameters that directives of a group do not give, of pbrt-v4.
-    Attribute(Quoted, Params),
-    AttributeBegin,
-    AttributeEnd,
-    Camera(Quoted, Params),
-    /// Primaries of colours, of pbrt-v4.
-    ColorSpace(Quoted),
-    ConcatTransform([f64; 16]),
-    CoordSysTransform(Quoted),
-    CoordinateSystem(Quoted),
-    Film(Quoted, Params),
-    Identity,
-    Integrator(Quoted, Params),
-    LightSource(Quoted, Params),
-    LookAt([f64; 9]),
-    MakeNamedMaterial(Quoted, Params),
-    MakeNamedMedium(Quoted, Params),
-    Material(Quoted, Params),
-    MediumInterface {
-        inside: Quoted,
-        outside: Quoted,
-    },
-    NamedMaterial(Quoted),
-    ObjectBegin(Quoted),
-    ObjectEnd,
-    ObjectInstance(Quoted),
-    /// Options of the program, of pbrt-v4.
-    Option(Params),
-    PixelFilter(Quoted, Params),
-    ReverseOrientation,
-    Rotate([f64; 4]),
-    Sampler(Quoted, Params),
-    Scale([f64; 3]),
-    Shape(Quoted, Params),
-    Texture {
-        name: Quoted,
-        /// `float`, `color` or `spectrum`.
-        value_type: Quoted,
-        class: Quoted,
-        params: Params,
-    },
-    Transform([f64; 16]),
-    TransformBegin,
-    TransformEnd,
-    /// Times of the transformations at the start and at the end.
-    TransformTimes([f64; 2]),
-    Translate([f64; 3]),
-    WorldBegin,
-    WorldEnd,
+/// Section of the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Phase {
+    /// Before `WorldBegin`.
+    Options,
+    /// Between `WorldBegin` and `WorldEnd`.
+    World,
+    /// After `WorldEnd`.
+    Done,
 }
 
-impl Directive {
-    /// List of parameters, if the directive ends with one.
-    pub fn params_mut(&mut self) -> Option<&mut Params> {
-        match self {
-            Self::Accelerator(_, params)
-            | Self::AreaLightSource(_, params)
-            | Self::Attribute(_, params)
-            | Self::Camera(_, params)
-            | Self::Film(_, params)
-            | Self::Integrator(_, params)
-            | Self::LightSource(_, params)
-            | Self::MakeNamedMaterial(_, params)
-            | Self::MakeNamedMedium(_, params)
-            | Self::Material(_, params)
-            | Self::Option(params)
-            | Self::PixelFilter(_, params)
-            | Self::Sampler(_, params)
-            | Self::Shape(_, params)
-            | Self::Texture { params, .. } => Some(params),
-            _ => None,
+/// Makes the directives of rows: name, the section of the file that it belongs to, and arguments.
+macro_rules! directives {
+    ($($(#[$doc:meta])* $name:ident $(in $phase:ident)? ($($argument:ident: $type:ty),*);)*) => {
+        /// Directive with its arguments.
+        #[derive(Debug)]
+        pub(crate) enum Directive {
+            $($(#[$doc])* $name($($type),*),)*
         }
-    }
+
+        /// The names of all directives, in alphabetical order.
+        pub(crate) const DIRECTIVES: &[&str] = &[$(stringify!($name)),*];
+
+        impl Directive {
+            /// Reads the arguments of the directive of a name.
+            pub fn read(name: &str, from: &mut Arguments) -> Result<Self, Failed> {
+                Ok(match name {
+                    $(stringify!($name) => Self::$name($(<$type as Argument>::read(from)?),*),)*
+                    _ => return Err(Failed),
+                })
+            }
+
+            /// List of parameters, if the directive ends with one.
+            pub fn params_mut(&mut self) -> Option<&mut Params> {
+                match self {
+                    $(Self::$name($($argument),*) => None$(.or($argument.params_mut()))*,)*
+                }
+            }
+
+            /// Section of the file that the directive belongs to, if it is not allowed in both.
+            pub fn phase(&self) -> Option<Phase> {
+                match self {
+                    $(Self::$name(..) => None$(.or(Some(Phase::$phase)))?,)*
+                }
+            }
+        }
+    };
+}
+
+directives! {
+    Accelerator in Options (kind: Quoted, params: Params);
+    ActiveTransform (active: ActiveTransform);
+    AreaLightSource in World (kind: Quoted, params: Params);
+    /// Values of parameters that directives of a group do not give, of pbrt-v4.
+    Attribute (group: Quoted, params: Params);
+    AttributeBegin in World ();
+    AttributeEnd in World ();
+    Camera in Options (kind: Quoted, params: Params);
+    /// Primaries of colours, of pbrt-v4.
+    ColorSpace (name: Quoted);
+    ConcatTransform (matrix: Matrix);
+    CoordSysTransform (name: Quoted);
+    CoordinateSystem (name: Quoted);
+    Film in Options (kind: Quoted, params: Params);
+    Identity ();
+    /// An `Include` between blocks of its own, of pbrt-v4. The parser follows both.
+    Import (path: Quoted);
+    Include (path: Quoted);
+    Integrator in Options (kind: Quoted, params: Params);
+    LightSource in World (kind: Quoted, params: Params);
+    LookAt (numbers: [f64; 9]);
+    MakeNamedMaterial in World (name: Quoted, params: Params);
+    MakeNamedMedium (name: Quoted, params: Params);
+    Material in World (kind: Quoted, params: Params);
+    /// Media inside and outside. A single name is for both sides.
+    MediumInterface (inside: Quoted, outside: Option<Quoted>);
+    NamedMaterial in World (name: Quoted);
+    ObjectBegin in World (name: Quoted);
+    ObjectEnd in World ();
+    ObjectInstance in World (name: Quoted);
+    /// Options of the program, of pbrt-v4.
+    Option in Options (params: Params);
+    PixelFilter in Options (kind: Quoted, params: Params);
+    ReverseOrientation in World ();
+    Rotate (by: [f64; 4]);
+    Sampler in Options (kind: Quoted, params: Params);
+    Scale (by: [f64; 3]);
+    Shape in World (kind: Quoted, params: Params);
+    /// The type of the values is `float`, `color` or `spectrum`.
+    Texture in World (name: Quoted, value_type: Quoted, class: Quoted, params: Params);
+    Transform (matrix: Matrix);
+    TransformBegin in World ();
+    TransformEnd in World ();
+    /// Times of the transformations at the start and at the end.
+    TransformTimes in Options (times: [f64; 2]);
+    Translate (by: [f64; 3]);
+    WorldBegin in Options ();
+    WorldEnd in World ();
 }
 
 /// Receiver of directives.
 pub(crate) trait Handler {
     /// Called once per well-formed directive, in the order of the file. `at` is the place of the directive's name.
     fn directive(&mut self, at: Span, directive: Directive, report: &mut Report);
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_names_can_be_searched() {
+        assert!(super::DIRECTIVES.is_sorted());
+    }
 }

@@ -26,7 +26,7 @@
 //! Data flows from bytes to tokens (`lexer`), to directives (`parser`, `params`), to the scene (`builder`).
 //!
 //! - `source`, `report`, `diagnostic`, `suggest`: files in memory, places in them, and messages about them
-//! - `names`, `number`, `lexer`, `params`, `directive`, `parser`: the syntax
+//! - `number`, `lexer`, `params`, `arguments`, `directive`, `parser`: the syntax, with directives as rows
 //! - `lookup`: typed parameters of a directive, and the report of unknown ones
 //! - `state`, `builder`: the graphics state, and the scene under construction
 //! - `budget`, `parts`: limits on memory, and on nested textures and materials
@@ -37,6 +37,7 @@
 //! - `ply`, `mesh_file`: PLY meshes, and meshes that scenes name;  `bsdf_file`: tables of scattering
 #![forbid(unsafe_code)]
 
+mod arguments;
 mod bsdf_file;
 mod budget;
 mod builder;
@@ -51,7 +52,6 @@ mod material;
 mod medium;
 mod mesh_file;
 mod named_spectra;
-mod names;
 mod number;
 mod params;
 mod parser;

@@ -7,7 +7,7 @@ use crate::lexer::{Lexer, Token, TokenKind, unquote};
 use crate::number::{NumberError, parse_float, parse_integer};
 use crate::report::Report;
 use crate::source::Span;
-use crate::{names, suggest};
+use crate::{directive, suggest};
 
 /// Declared type of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -306,7 +306,7 @@ fn read_values(
 }
 
 fn is_directive(word: &[u8]) -> bool {
-    std::str::from_utf8(word).is_ok_and(|w| names::DIRECTIVES.binary_search(&w).is_ok())
+    std::str::from_utf8(word).is_ok_and(|w| directive::DIRECTIVES.binary_search(&w).is_ok())
 }
 
 /// Reader of values of one type. After the first wrong value, the rest is skipped.

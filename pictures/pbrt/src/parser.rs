@@ -3,9 +3,9 @@
 //! A [`Handler`] receives each directive with its place and builds the scene. Included files are an explicit stack of
 //! lexers, so no input can exhaust the call stack.
 
-use crate::directive::{ActiveTransform, Directive, Handler, Quoted};
-use crate::lexer::{Lexer, Token, TokenKind, check_utf8, unquote};
-use crate::names::DIRECTIVES;
+use crate::arguments::{ACTIVE_TRANSFORMS, Arguments, Failed};
+use crate::directive::{DIRECTIVES, Directive, Handler, Quoted};
+use crate::lexer::{Lexer, Token, TokenKind, check_utf8};
 use crate::number::parse_float;
 use crate::params::{self, Outcome, Params, shorten};
 use crate::report::Report;
@@ -52,9 +52,6 @@ struct Includer {
     import: Option<Span>,
 }
 
-/// Failure that was reported. The rest of the directive is to be skipped.
-struct Failed;
-
 impl Parser {
     /// Reads all files to their ends, and returns the end of the main file. Stops early when reading is ended.
     fn run(&mut self, handler: &mut impl Handler, report: &mut Report) -> Span {
@@ -70,7 +67,7 @@ impl Parser {
                 };
                 self.current = lexer;
                 if let Some(at) = import {
-                    handler.directive(at, Directive::AttributeEnd, report);
+                    handler.directive(at, Directive::AttributeEnd(), report);
                 }
                 continue;
             };
@@ -92,21 +89,21 @@ impl Parser {
                 skip_past_arguments(lexer, report);
                 continue;
             }
-            if name == "Include" || name == "Import" {
-                // In pbrt-v4, the state after an `Import` is the state before.
-                let import = (name == "Import").then_some(token.span);
-                match quoted(lexer, report, token) {
-                    Ok(path) => {
-                        let is_open = self.include(path, import, report);
-                        if let Some(at) = import.filter(|_| is_open) {
-                            handler.directive(at, Directive::AttributeBegin, report);
-                        }
-                    }
-                    Err(Failed) => skip_to_directive(lexer, report),
+            let mut arguments = Arguments {
+                lexer,
+                report,
+                at: token,
+            };
+            match Directive::read(name, &mut arguments) {
+                Ok(Directive::Include(path)) => {
+                    self.include(path, None, report);
                 }
-                continue;
-            }
-            match directive(lexer, report, token, name) {
+                // In pbrt-v4, the state after an `Import` is the state before.
+                Ok(Directive::Import(path)) => {
+                    if self.include(path, Some(token.span), report) {
+                        handler.directive(token.span, Directive::AttributeBegin(), report);
+                    }
+                }
                 Ok(mut directive) => {
                     if let Some(params) = directive.params_mut() {
                         self.take_parameters_of_includers(params, report);
@@ -138,21 +135,17 @@ impl Parser {
         let full = report.sources.folder.join(&path.text);
         let (file, is_new) = match report.sources.open(&full) {
             Ok(opened) => opened,
-            Err(error) if error.kind() == std::io::ErrorKind::OutOfMemory => {
-                report.error_help(
-                    path.span,
-                    format!("cannot include {:?}: {error}", path.text),
-                    "allow more memory, or leave something out",
-                );
-                report.end();
-                return false;
-            }
             Err(error) => {
-                report.error_help(
-                    path.span,
-                    format!("cannot include {:?}: {error}", path.text),
-                    "paths start at the folder of the main scene file",
-                );
+                let is_over = error.kind() == std::io::ErrorKind::OutOfMemory;
+                let help = match is_over {
+                    true => "allow more memory, or leave something out",
+                    false => "paths start at the folder of the main scene file",
+                };
+                let message = format!("cannot include {:?}: {error}", path.text);
+                report.error_help(path.span, message, help);
+                if is_over {
+                    report.end();
+                }
                 return false;
             }
         };
@@ -299,174 +292,4 @@ fn looks_like_directive(word: &[u8]) -> bool {
     word[0].is_ascii_uppercase()
         && parse_float(word).is_err()
         && ACTIVE_TRANSFORMS.iter().all(|(name, _)| *name != word)
-}
-
-/// Reads the arguments of a directive other than `Include`.
-fn directive(
-    lexer: &mut Lexer,
-    report: &mut Report,
-    at: Token,
-    name: &'static str,
-) -> Result<Directive, Failed> {
-    macro_rules! with_params {
-        ($variant:ident) => {{
-            let name = quoted(lexer, report, at)?;
-            let params = params(lexer, report)?;
-            Directive::$variant(name, params)
-        }};
-    }
-    Ok(match name {
-        "Accelerator" => with_params!(Accelerator),
-        "ActiveTransform" => Directive::ActiveTransform(active_transform(lexer, report, at)?),
-        "AreaLightSource" => with_params!(AreaLightSource),
-        "Attribute" => with_params!(Attribute),
-        "AttributeBegin" => Directive::AttributeBegin,
-        "AttributeEnd" => Directive::AttributeEnd,
-        "Camera" => with_params!(Camera),
-        "ColorSpace" => Directive::ColorSpace(quoted(lexer, report, at)?),
-        "ConcatTransform" => Directive::ConcatTransform(matrix(lexer, report, at)?),
-        "CoordSysTransform" => Directive::CoordSysTransform(quoted(lexer, report, at)?),
-        "CoordinateSystem" => Directive::CoordinateSystem(quoted(lexer, report, at)?),
-        "Film" => with_params!(Film),
-        "Identity" => Directive::Identity,
-        "Integrator" => with_params!(Integrator),
-        "LightSource" => with_params!(LightSource),
-        "LookAt" => Directive::LookAt(numbers(lexer, report, at)?),
-        "MakeNamedMaterial" => with_params!(MakeNamedMaterial),
-        "MakeNamedMedium" => with_params!(MakeNamedMedium),
-        "Material" => with_params!(Material),
-        "MediumInterface" => {
-            let inside = quoted(lexer, report, at)?;
-            // In pbrt, a single name is for both sides.
-            let outside = match lexer.peek(report) {
-                Some(token) if token.kind == TokenKind::Text => quoted(lexer, report, at)?,
-                _ => inside.clone(),
-            };
-            Directive::MediumInterface { inside, outside }
-        }
-        "NamedMaterial" => Directive::NamedMaterial(quoted(lexer, report, at)?),
-        "ObjectBegin" => Directive::ObjectBegin(quoted(lexer, report, at)?),
-        "ObjectEnd" => Directive::ObjectEnd,
-        "ObjectInstance" => Directive::ObjectInstance(quoted(lexer, report, at)?),
-        "Option" => Directive::Option(params(lexer, report)?),
-        "PixelFilter" => with_params!(PixelFilter),
-        "ReverseOrientation" => Directive::ReverseOrientation,
-        "Rotate" => Directive::Rotate(numbers(lexer, report, at)?),
-        "Sampler" => with_params!(Sampler),
-        "Scale" => Directive::Scale(numbers(lexer, report, at)?),
-        "Shape" => with_params!(Shape),
-        "Texture" => Directive::Texture {
-            name: quoted(lexer, report, at)?,
-            value_type: quoted(lexer, report, at)?,
-            class: quoted(lexer, report, at)?,
-            params: params(lexer, report)?,
-        },
-        "Transform" => Directive::Transform(matrix(lexer, report, at)?),
-        "TransformBegin" => Directive::TransformBegin,
-        "TransformEnd" => Directive::TransformEnd,
-        "TransformTimes" => Directive::TransformTimes(numbers(lexer, report, at)?),
-        "Translate" => Directive::Translate(numbers(lexer, report, at)?),
-        "WorldBegin" => Directive::WorldBegin,
-        "WorldEnd" => Directive::WorldEnd,
-        _ => return Err(Failed),
-    })
-}
-
-/// Consumes the next token if `wanted` holds. Otherwise reports what the directive takes.
-fn expect(
-    lexer: &mut Lexer,
-    report: &mut Report,
-    at: Token,
-    takes: &str,
-    wanted: impl Fn(&Lexer, Token) -> bool,
-) -> Result<Token, Failed> {
-    let name = String::from_utf8_lossy(lexer.slice(at)).into_owned();
-    match lexer.peek(report) {
-        Some(token) if wanted(lexer, token) => {
-            lexer.next(report);
-            Ok(token)
-        }
-        Some(token) => {
-            if token.kind != TokenKind::Broken {
-                let found = shorten(&String::from_utf8_lossy(lexer.slice(token)));
-                report.error(token.span, format!("{name} takes {takes}, found {found}"));
-            }
-            Err(Failed)
-        }
-        None => {
-            report.error(
-                at.span,
-                format!("{name} takes {takes}, but the file ends here"),
-            );
-            Err(Failed)
-        }
-    }
-}
-
-fn quoted(lexer: &mut Lexer, report: &mut Report, at: Token) -> Result<Quoted, Failed> {
-    let takes = "a name in quotes";
-    let token = expect(lexer, report, at, takes, |_, t| t.kind == TokenKind::Text)?;
-    Ok(Quoted {
-        text: unquote(lexer.slice(token), token.span, report),
-        span: token.span,
-    })
-}
-
-fn params(lexer: &mut Lexer, report: &mut Report) -> Result<Params, Failed> {
-    match params::parse(lexer, report) {
-        Outcome::Complete(params) => Ok(params),
-        Outcome::Failed => Err(Failed),
-    }
-}
-
-fn numbers<const N: usize>(
-    lexer: &mut Lexer,
-    report: &mut Report,
-    at: Token,
-) -> Result<[f64; N], Failed> {
-    let takes = format!("{N} numbers");
-    let mut values = [0.0; N];
-    for value in &mut values {
-        let is_number =
-            |lexer: &Lexer, t: Token| t.kind == TokenKind::Word && number(lexer, t).is_some();
-        let token = expect(lexer, report, at, &takes, is_number)?;
-        *value = number(lexer, token).unwrap_or_default();
-    }
-    Ok(values)
-}
-
-fn number(lexer: &Lexer, token: Token) -> Option<f64> {
-    parse_float(lexer.slice(token))
-        .ok()
-        .filter(|v| v.is_finite())
-}
-
-fn matrix(lexer: &mut Lexer, report: &mut Report, at: Token) -> Result<[f64; 16], Failed> {
-    let takes = "16 numbers in [ ]";
-    expect(lexer, report, at, takes, |_, t| t.kind == TokenKind::Open)?;
-    let values = numbers(lexer, report, at)?;
-    expect(lexer, report, at, takes, |_, t| t.kind == TokenKind::Close)?;
-    Ok(values)
-}
-
-const ACTIVE_TRANSFORMS: &[(&[u8], ActiveTransform)] = &[
-    (b"All", ActiveTransform::All),
-    (b"StartTime", ActiveTransform::StartTime),
-    (b"EndTime", ActiveTransform::EndTime),
-];
-
-fn active_transform(
-    lexer: &mut Lexer,
-    report: &mut Report,
-    at: Token,
-) -> Result<ActiveTransform, Failed> {
-    let choice = |lexer: &Lexer, token: Token| {
-        ACTIVE_TRANSFORMS
-            .iter()
-            .find(|(name, _)| *name == lexer.slice(token))
-            .map(|(_, choice)| *choice)
-    };
-    let takes = "All, StartTime or EndTime";
-    let token = expect(lexer, report, at, takes, |l, t| choice(l, t).is_some())?;
-    choice(lexer, token).ok_or(Failed)
 }

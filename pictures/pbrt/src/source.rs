@@ -10,7 +10,7 @@ use std::sync::Arc;
 
 use flate2::read::MultiGzDecoder;
 
-use crate::names::DIRECTIVES;
+use crate::directive::DIRECTIVES;
 
 /// Place in a file: a token or a part of one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,7 +5,8 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use crate::{
-    Error, Options, camera, film, light, load, material, medium, names, settings, shape, texture,
+    Error, Options, camera, directive, film, light, load, material, medium, settings, shape,
+    texture,
 };
 
 /// Group of names of pbrt-v3.
@@ -134,7 +135,7 @@ fn the_document_lists_what_the_code_knows() {
     let text = std::fs::read_to_string(path).unwrap();
     let tables = tables(&text);
     let none: &[&str] = &[];
-    let mut groups = vec![("Directives", names::DIRECTIVES, none)];
+    let mut groups = vec![("Directives", directive::DIRECTIVES, none)];
     groups.extend(
         GROUPS
             .iter()

@@ -3,21 +3,10 @@
 use glam::DMat4;
 
 use super::Builder;
-use crate::directive::Directive;
+use crate::directive::{Directive, Phase};
 use crate::report::Report;
 use crate::source::Span;
 use crate::state::{BlockKind, Transforms};
-
-/// Section of the file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Phase {
-    /// Before `WorldBegin`.
-    Options,
-    /// Between `WorldBegin` and `WorldEnd`.
-    World,
-    /// After `WorldEnd`.
-    Done,
-}
 
 /// Largest depth of nested blocks. Each open block takes some hundred bytes.
 const MAX_BLOCKS: usize = 10_000;
@@ -25,47 +14,18 @@ const MAX_BLOCKS: usize = 10_000;
 impl Builder<'_> {
     /// Returns true if a directive is allowed in the current section. Otherwise reports it.
     pub(super) fn check_phase(&self, at: Span, directive: &Directive, report: &mut Report) -> bool {
-        use Directive as D;
-        let wanted = match directive {
-            D::Accelerator(..)
-            | D::Camera(..)
-            | D::Film(..)
-            | D::Integrator(..)
-            | D::PixelFilter(..)
-            | D::Sampler(..)
-            | D::Option(..)
-            | D::TransformTimes(..)
-            | D::WorldBegin => Some(Phase::Options),
-            D::AreaLightSource(..)
-            | D::AttributeBegin
-            | D::AttributeEnd
-            | D::LightSource(..)
-            | D::MakeNamedMaterial(..)
-            | D::Material(..)
-            | D::NamedMaterial(..)
-            | D::ObjectBegin(..)
-            | D::ObjectEnd
-            | D::ObjectInstance(..)
-            | D::ReverseOrientation
-            | D::Shape(..)
-            | D::Texture { .. }
-            | D::TransformBegin
-            | D::TransformEnd
-            | D::WorldEnd => Some(Phase::World),
-            _ => None,
-        };
         if self.phase == Phase::Done {
             let message = "directives after WorldEnd (several pictures in one file) are";
             report.unsupported(at, message);
             return false;
         }
-        if wanted.is_none_or(|phase| phase == self.phase) {
+        if directive.phase().is_none_or(|phase| phase == self.phase) {
             return true;
         }
         let name = String::from_utf8_lossy(report.sources.slice(at)).into_owned();
         match (directive, self.phase) {
-            (D::WorldBegin, _) => report.error(at, "WorldBegin within a world block"),
-            (D::WorldEnd, _) => report.error(at, "WorldEnd without WorldBegin"),
+            (Directive::WorldBegin(), _) => report.error(at, "WorldBegin within a world block"),
+            (Directive::WorldEnd(), _) => report.error(at, "WorldEnd without WorldBegin"),
             (_, Phase::Options) => {
                 let message = format!("{name} belongs between WorldBegin and WorldEnd");
                 report.error_once(at, message, None);

@@ -1,5 +1,7 @@
 //! Media by name, and those on the two sides of shapes.
 
+use std::sync::Arc;
+
 use antumbra_scene::{Integrator, Light, Medium, MediumInterface, Shape};
 
 use super::Builder;
@@ -36,6 +38,12 @@ impl Builder<'_> {
                 .insert(name.text, self.media.len() as u32);
             self.media.push(medium);
         }
+    }
+
+    pub(super) fn medium_interface(&mut self, inside: Quoted, outside: Option<Quoted>) {
+        let outside = outside.unwrap_or_else(|| inside.clone());
+        self.state.now.media =
+            [inside, outside].map(|name| (!name.text.is_empty()).then(|| Arc::new(name)));
     }
 
     /// Media on the two sides of a shape, if they differ.

@@ -3,7 +3,10 @@
 use antumbra_image::Allowance;
 
 use super::Builder;
+use crate::directive::Quoted;
+use crate::params::Params;
 use crate::report::Report;
+use crate::source::Span;
 use crate::texture::{self, TextureSpace};
 
 impl Builder<'_> {
@@ -12,6 +15,27 @@ impl Builder<'_> {
             world_from_texture: self.state.now.transforms.start,
             origin: self.options.origin,
         }
+    }
+
+    pub(super) fn texture(
+        &mut self,
+        at: Span,
+        [name, value_type, class]: [Quoted; 3],
+        params: Params,
+        report: &mut Report,
+    ) {
+        if self.transforms().is_animated() {
+            let message = "textures do not move: the transformation at the start is taken";
+            report.note(at, message);
+        }
+        self.pending_textures.push(texture::Declaration {
+            at,
+            name,
+            value_type,
+            class,
+            params,
+            space: self.texture_space(),
+        });
     }
 
     /// Memory that images may take.

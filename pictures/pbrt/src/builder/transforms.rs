@@ -10,7 +10,7 @@ use crate::params::Params;
 use crate::report::Report;
 use crate::source::Span;
 use crate::state::Transforms;
-use crate::{camera, suggest};
+use crate::{camera, suggest, transform};
 
 impl Builder<'_> {
     /// A transformation to the world of the file as one to the scene, which is measured from its origin.
@@ -25,6 +25,29 @@ impl Builder<'_> {
 
     pub(super) fn concat(&mut self, matrix: DMat4) {
         self.transforms().change(|current| current * matrix);
+    }
+
+    pub(super) fn rotate(&mut self, at: Span, by: [f64; 4], report: &mut Report) {
+        match transform::rotate(by) {
+            Some(matrix) => self.concat(matrix),
+            None => report.error(at, "the axis of the rotation has no length"),
+        }
+    }
+
+    pub(super) fn look_at(&mut self, at: Span, numbers: [f64; 9], report: &mut Report) {
+        match transform::look_at(numbers) {
+            Some(matrix) => self.concat(matrix),
+            None => report.error_help(
+                at,
+                "the LookAt has no direction",
+                "eye and target must differ, and up must not point along the view",
+            ),
+        }
+    }
+
+    pub(super) fn coordinate_system(&mut self, name: Quoted) {
+        let Transforms { start, end, .. } = self.state.now.transforms;
+        self.coordinate_systems.insert(name.text, [start, end]);
     }
 
     pub(super) fn transform_times(&mut self, at: Span, times: [f64; 2], report: &mut Report) {

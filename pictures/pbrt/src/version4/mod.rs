@@ -189,7 +189,7 @@ pub(crate) fn translate(directive: &mut Directive, report: &mut Report) {
             }
         }
         D::MakeNamedMedium(_, params) => medium(params, report),
-        D::Texture { class, params, .. } => image_or_scale(class, params, report),
+        D::Texture(_, _, class, params) => image_or_scale(class, params, report),
         D::LightSource(kind, params) => {
             params.widen("scale");
             if kind.text == "projection" {
@@ -413,7 +413,7 @@ pub(crate) fn fill(directive: &mut Directive, state: &State) {
         D::LightSource(..) | D::AreaLightSource(..) => "light",
         D::Material(..) | D::MakeNamedMaterial(..) => "material",
         D::MakeNamedMedium(..) => "medium",
-        D::Texture { .. } => "texture",
+        D::Texture(..) => "texture",
         _ => return,
     };
     if let Some(params) = directive.params_mut() {
