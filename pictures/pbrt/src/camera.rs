@@ -13,7 +13,7 @@ use crate::params::{ParamType, Params};
 use crate::report::Report;
 use crate::source::Span;
 use crate::state::{MIRRORS, MIRRORS_HELP, Transforms};
-use crate::{suggest, transform};
+use crate::transform;
 
 /// Supported cameras.
 pub(crate) const SUPPORTED: &[&str] = &["environment", "orthographic", "perspective", "realistic"];
@@ -84,11 +84,7 @@ pub(crate) fn declare(
                 true => SUPPORTED4,
                 false => SUPPORTED,
             };
-            report.error_help(
-                kind.span,
-                format!("unknown camera {name:?}"),
-                suggest::help(name, known),
-            );
+            report.unknown(kind.span, "camera", name, known);
             lookup.ignore_all();
         }
     }

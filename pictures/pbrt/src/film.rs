@@ -7,7 +7,6 @@ use crate::lookup::{Lookup, one_float};
 use crate::params::{ParamType, Params, Values};
 use crate::report::Report;
 use crate::source::Span;
-use crate::suggest;
 
 /// Handles `Film`. Returns the film, and its diagonal in millimetres with its place, where it is given.
 pub(crate) fn declare(
@@ -151,11 +150,7 @@ pub(crate) fn declare_filter(
             tau: lookup.float_in("tau", 3.0, [f32::MIN_POSITIVE, f32::MAX], report),
         },
         name => {
-            report.error_help(
-                kind.span,
-                format!("unknown pixel filter {name:?}"),
-                suggest::help(name, FILTERS),
-            );
+            report.unknown(kind.span, "pixel filter", name, FILTERS);
             lookup.ignore_all();
             Filter::default()
         }

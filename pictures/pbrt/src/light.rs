@@ -13,7 +13,7 @@ use crate::report::Report;
 use crate::source::Span;
 use crate::state::Transforms;
 use crate::texture::Images;
-use crate::{suggest, transform};
+use crate::transform;
 
 /// Lights without a surface. All lights of pbrt-v3 are supported.
 pub(crate) const SUPPORTED: &[&str] = &[
@@ -56,11 +56,7 @@ pub(crate) fn declare(
         "goniometric" => goniometric(&mut lookup, &to_world, images, report),
         "projection" => projection(&mut lookup, &to_world, images, report),
         name => {
-            report.error_help(
-                kind.span,
-                format!("unknown light {name:?}"),
-                suggest::help(name, SUPPORTED),
-            );
+            report.unknown(kind.span, "light", name, SUPPORTED);
             lookup.ignore_all();
             None
         }
@@ -364,11 +360,7 @@ pub(crate) fn declare_area(
         }
         "" => None,
         name => {
-            report.error_help(
-                kind.span,
-                format!("unknown area light {name:?}"),
-                suggest::help(name, SUPPORTED_AREA),
-            );
+            report.unknown(kind.span, "area light", name, SUPPORTED_AREA);
             lookup.ignore_all();
             None
         }

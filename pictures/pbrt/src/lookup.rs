@@ -79,6 +79,21 @@ impl<'a> Lookup<'a> {
         self.params.list.iter().any(|p| p.name == name)
     }
 
+    /// Finds a parameter that must be given. `written` is its type as the advice has it.
+    pub fn needed(
+        &mut self,
+        name: &'static str,
+        types: &'static [ParamType],
+        written: &str,
+        report: &mut Report,
+    ) -> Option<&'a Param> {
+        let found = self.find(name, types);
+        if found.is_none() {
+            self.report_missing(name, written, report);
+        }
+        found
+    }
+
     /// Reports that a parameter is missing, unless there is one of another type. Parameters of a wrong type and broken ones are
     /// reported elsewhere.
     pub fn report_missing(&self, name: &str, param_type: &str, report: &mut Report) {
@@ -266,6 +281,19 @@ impl<'a> Lookup<'a> {
     pub fn string(&mut self, name: &'static str, report: &mut Report) -> Option<(&'a str, Span)> {
         let param = self.find(name, &[ParamType::String])?;
         one_string(param, report).map(|text| (text, param.value))
+    }
+
+    /// Single string with its place, which must be given.
+    pub fn needed_string(
+        &mut self,
+        name: &'static str,
+        report: &mut Report,
+    ) -> Option<(&'a str, Span)> {
+        let found = self.string(name, report);
+        if found.is_none() {
+            self.report_missing(name, "string", report);
+        }
+        found
     }
 
     /// Colour with finite components that are not negative, or the default.

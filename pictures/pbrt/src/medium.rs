@@ -35,10 +35,7 @@ pub(crate) fn declare(
 }
 
 fn read(lookup: &mut Lookup, world_from_medium: &DMat4, report: &mut Report) -> Option<Medium> {
-    let Some((kind, kind_span)) = lookup.string("type", report) else {
-        lookup.report_missing("type", "string", report);
-        return None;
-    };
+    let (kind, kind_span) = lookup.needed_string("type", report)?;
     let Coefficients {
         absorption,
         scattering,
@@ -53,11 +50,7 @@ fn read(lookup: &mut Lookup, world_from_medium: &DMat4, report: &mut Report) -> 
         "homogeneous" => None,
         "heterogeneous" => Some(grid(lookup, world_from_medium, report)?),
         kind => {
-            report.error_help(
-                kind_span,
-                format!("unknown medium {kind:?}"),
-                suggest::help(kind, SUPPORTED),
-            );
+            report.unknown(kind_span, "medium", kind, SUPPORTED);
             return None;
         }
     };
@@ -106,10 +99,7 @@ fn grid(
     let size = ["nx", "ny", "nz"].map(|name| lookup.integer_in(name, 1, [1, MAX_CELLS], report));
     let p0 = lookup.point("p0", DVec3::ZERO, report);
     let p1 = lookup.point("p1", DVec3::ONE, report);
-    let Some(param) = lookup.find("density", &[ParamType::Float]) else {
-        lookup.report_missing("density", "float", report);
-        return None;
-    };
+    let param = lookup.needed("density", &[ParamType::Float], "float", report)?;
     let Values::Floats(values) = &param.values else {
         return None;
     };

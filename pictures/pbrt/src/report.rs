@@ -7,6 +7,7 @@ use glam::DMat3;
 use crate::bsdf_file::Tables;
 use crate::diagnostic::{Diagnostic, Diagnostics, Severity};
 use crate::source::{Sources, Span};
+use crate::suggest;
 
 /// Directives that only a picture shows.
 const LOOKS: [&str; 13] = [
@@ -69,6 +70,12 @@ impl Report {
     /// Records a mistake and what would be right.
     pub fn error_help(&mut self, span: Span, message: impl Into<String>, help: impl Into<String>) {
         self.add(Severity::Error, span, message.into(), Some(help.into()));
+    }
+
+    /// Records that a name is not known, with the known one that is closest.
+    pub fn unknown(&mut self, span: Span, what: &str, name: &str, known: &[&str]) {
+        let message = format!("unknown {what} {name:?}");
+        self.error_help(span, message, suggest::help(name, known));
     }
 
     /// Records a note. Further notes with an equal text are dropped.

@@ -11,7 +11,6 @@ use crate::lookup::Lookup;
 use crate::params::{ParamType, Params};
 use crate::report::Report;
 use crate::source::Span;
-use crate::suggest;
 
 /// Default sampler of pbrt.
 pub(crate) const DEFAULT_SAMPLER: Sampler = Sampler {
@@ -50,11 +49,7 @@ pub(crate) fn declare_sampler(
         "02sequence" | "lowdiscrepancy" => SamplerKind::ZeroTwoSequence,
         "maxmindist" => SamplerKind::MaxMinDist,
         name => {
-            report.error_help(
-                kind.span,
-                format!("unknown sampler {name:?}"),
-                suggest::help(name, SAMPLERS),
-            );
+            report.unknown(kind.span, "sampler", name, SAMPLERS);
             return DEFAULT_SAMPLER;
         }
     };
@@ -174,11 +169,7 @@ pub(crate) fn declare_integrator(
             open: std::f32::consts::PI,
         },
         name => {
-            report.error_help(
-                kind.span,
-                format!("unknown integrator {name:?}"),
-                suggest::help(name, INTEGRATORS),
-            );
+            report.unknown(kind.span, "integrator", name, INTEGRATORS);
             lookup.ignore_all();
             Integrator::default()
         }
@@ -193,10 +184,11 @@ fn light_strategy(lookup: &mut Lookup, report: &mut Report) -> LightStrategy {
         Some(("power", _)) => LightStrategy::Power,
         Some(("uniform", _)) => LightStrategy::Uniform,
         Some((unknown, span)) => {
-            report.error_help(
+            report.unknown(
                 span,
-                format!("unknown light sample strategy {unknown:?}"),
-                suggest::help(unknown, &["power", "spatial", "uniform"]),
+                "light sample strategy",
+                unknown,
+                &["power", "spatial", "uniform"],
             );
             LightStrategy::Spatial
         }

@@ -38,69 +38,19 @@ pub(crate) fn read_emission(param: &Param, report: &mut Report) -> Option<Rgb> {
 
 fn read_as(param: &Param, of: Of, report: &mut Report) -> Option<Rgb> {
     let name = &param.name;
-    let is_version4 = report.is_version4;
-    let color_of = |samples: Vec<[f64; 2]>| match of {
-        _ if !is_version4 => from_samples(samples),
-        Of::Surface => of_surface(samples),
-        Of::Light => at_luminance_1(from_samples(samples)),
-    };
     let color = match (&param.values, param.param_type) {
         (Values::Broken, _) => return None,
-        (Values::Strings(files), _) => {
-            let [file] = files.as_slice() else {
-                report.error(
-                    param.list,
-                    format!("{name:?} takes one file, found {}", files.len()),
-                );
-                return None;
-            };
-            let named = match is_version4 {
-                true => named_spectra::find(file),
-                false => None,
-            };
-            match named {
-                Some(Named::Samples(samples)) => color_of(samples),
-                // Glasses have one index for all wavelengths.
-                Some(Named::Index(index)) => color_of(vec![[f64::from(FIRST_NM), index]]),
-                Some(Named::Light(light)) => light,
-                None => match read_spd(file, report) {
-                    Ok(samples) => color_of(samples),
-                    Err(message) => {
-                        report.error_help(
-                            param.value,
-                            format!("cannot read spectrum {file:?}: {message}"),
-                            format!("without the file, write it as \"rgb {name}\""),
-                        );
-                        return None;
-                    }
-                },
-            }
-        }
+        (Values::Strings(files), _) => of_file(param, files, of, report)?,
         (Values::Floats(values), _) if values.iter().any(|v| !v.is_finite()) => {
             report.error(param.list, format!("{name:?} must be finite"));
             return None;
         }
         (Values::Floats(values), ParamType::Spectrum) if !values.is_empty() => {
             let pairs = values.chunks_exact(2);
-            color_of(pairs.map(|p| [f64::from(p[0]), f64::from(p[1])]).collect())
+            let samples = pairs.map(|p| [f64::from(p[0]), f64::from(p[1])]);
+            color_of(samples.collect(), of, report)
         }
-        (Values::Floats(values), ParamType::Blackbody) => match values[..] {
-            [kelvin] if kelvin > 0.0 && is_version4 => {
-                at_luminance_1(from_black_body(kelvin.into()))
-            }
-            [kelvin, scale] if kelvin > 0.0 && !is_version4 => {
-                from_black_body(kelvin.into()) * f64::from(scale)
-            }
-            [kelvin] | [kelvin, _] if !(kelvin > 0.0) => {
-                report.error(
-                    param.value,
-                    format!("temperature {kelvin} of {name:?} must be positive"),
-                );
-                return None;
-            }
-            _ if is_version4 => return wrong_count(param, "one temperature", report),
-            _ => return wrong_count(param, "a temperature and a scale", report),
-        },
+        (Values::Floats(values), ParamType::Blackbody) => black_body(param, values, report)?,
         (Values::Floats(values), kind @ (ParamType::Rgb | ParamType::Xyz)) => match values[..] {
             [x, y, z] if kind == ParamType::Xyz => rgb_from_xyz(Vec3::new(x, y, z).as_dvec3()),
             [r, g, b] if r >= 0.0 && g >= 0.0 && b >= 0.0 => match report.color_space {
@@ -132,7 +82,68 @@ fn read_as(param: &Param, of: Of, report: &mut Report) -> Option<Rgb> {
     Some(color)
 }
 
-fn wrong_count(param: &Param, takes: &str, report: &mut Report) -> Option<Rgb> {
+/// Colour of a spectrum on an object.
+fn color_of(samples: Vec<[f64; 2]>, of: Of, report: &Report) -> DVec3 {
+    match of {
+        _ if !report.is_version4 => from_samples(samples),
+        Of::Surface => of_surface(samples),
+        Of::Light => at_luminance_1(from_samples(samples)),
+    }
+}
+
+/// Colour of a named spectrum, or of one in a file. `None`: a mistake was reported.
+fn of_file(param: &Param, files: &[String], of: Of, report: &mut Report) -> Option<DVec3> {
+    let name = &param.name;
+    let [file] = files else {
+        let message = format!("{name:?} takes one file, found {}", files.len());
+        report.error(param.list, message);
+        return None;
+    };
+    let named = match report.is_version4 {
+        true => named_spectra::find(file),
+        false => None,
+    };
+    let samples = match named {
+        Some(Named::Light(light)) => return Some(light),
+        Some(Named::Samples(samples)) => samples,
+        // Glasses have one index for all wavelengths.
+        Some(Named::Index(index)) => vec![[f64::from(FIRST_NM), index]],
+        None => match read_spd(file, report) {
+            Ok(samples) => samples,
+            Err(message) => {
+                report.error_help(
+                    param.value,
+                    format!("cannot read spectrum {file:?}: {message}"),
+                    format!("without the file, write it as \"rgb {name}\""),
+                );
+                return None;
+            }
+        },
+    };
+    Some(color_of(samples, of, report))
+}
+
+/// Colour of a black body: of luminance 1 in pbrt-v4, times a scale in pbrt-v3. `None`: a mistake was reported.
+fn black_body(param: &Param, values: &[f32], report: &mut Report) -> Option<DVec3> {
+    let is_version4 = report.is_version4;
+    match *values {
+        [kelvin] if kelvin > 0.0 && is_version4 => {
+            Some(at_luminance_1(from_black_body(kelvin.into())))
+        }
+        [kelvin, scale] if kelvin > 0.0 && !is_version4 => {
+            Some(from_black_body(kelvin.into()) * f64::from(scale))
+        }
+        [kelvin] | [kelvin, _] if !(kelvin > 0.0) => {
+            let message = format!("temperature {kelvin} of {:?} must be positive", param.name);
+            report.error(param.value, message);
+            None
+        }
+        _ if is_version4 => wrong_count(param, "one temperature", report),
+        _ => wrong_count(param, "a temperature and a scale", report),
+    }
+}
+
+fn wrong_count<T>(param: &Param, takes: &str, report: &mut Report) -> Option<T> {
     report.error(
         param.list,
         format!(

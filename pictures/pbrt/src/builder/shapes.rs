@@ -10,6 +10,7 @@ use glam::{DMat4, DVec3};
 use super::{Builder, SINGULAR, SINGULAR_HELP};
 use crate::directive::Quoted;
 use crate::lookup::Lookup;
+use crate::mesh_file::MeshFile;
 use crate::params::Params;
 use crate::report::Report;
 use crate::shape::Source;
@@ -17,26 +18,27 @@ use crate::source::Span;
 use crate::texture::Textured;
 use crate::{material, parts, shape, suggest, transform};
 
+/// Where a shape is.
+struct Place {
+    to_world: DMat4,
+    /// Where the origin of the scene is for the shape.
+    middle: DVec3,
+    is_of_object: bool,
+    /// Whether it moves: then it is an object of its own with one instance.
+    moves: bool,
+}
+
 impl Builder<'_> {
     pub(super) fn shape(&mut self, at: Span, kind: &Quoted, params: &Params, report: &mut Report) {
-        let transforms = self.state.now.transforms;
-        let is_of_object = self.state.now.object.is_some();
-        if transforms.is_animated() && is_of_object {
-            report.unsupported(at, "moving shapes within objects are");
-        }
-        // A shape that moves is an object of its own with one instance.
-        let moves = transforms.is_animated() && !is_of_object;
-        // Objects come to the origin by their instances.
-        let is_near = is_of_object || moves || self.options.origin == DVec3::ZERO;
-        let to_world = match is_of_object {
-            true => transforms.start,
-            false if moves => DMat4::IDENTITY,
-            false => self.to_origin(transforms.start),
-        };
-        if !transform::is_invertible(&to_world) {
-            report.error_once(at, SINGULAR, Some(SINGULAR_HELP));
+        let Some(place) = self.place(at, report) else {
             return;
-        }
+        };
+        let Place {
+            to_world,
+            is_of_object,
+            moves,
+            ..
+        } = place;
         // The shape's lookup may fall back on parameters of the material, which must live as long.
         let current = self.state.now.material.clone();
         let mut lookup = Lookup::new(at, format!("shape {:?}", kind.text), params);
@@ -45,28 +47,20 @@ impl Builder<'_> {
             state: &self.state,
             report,
         };
-        // Where the origin of the scene is for the shape.
-        let middle = match is_near {
-            true => DVec3::ZERO,
-            false => to_world.inverse().transform_point3(DVec3::ZERO),
-        };
-        let read = shape::read(kind, &mut values, &to_world, middle);
+        let read = shape::read(kind, &mut values, &to_world, place.middle);
         let material = material::of_shape(current.as_deref(), &mut lookup, &self.state, report);
         lookup.finish(report);
         let Some((source, cutouts)) = read else {
             return;
         };
         let area_light = self.state.now.area_light.clone();
-        if moves && area_light.is_some() {
+        if area_light.is_some() && (moves || is_of_object) {
             report.note(
                 at,
-                "area lights of shapes that move are left out, as in pbrt-v3",
-            );
-        }
-        if is_of_object && area_light.is_some() {
-            report.note(
-                at,
-                "area lights of objects are left out: in pbrt-v3 they light nothing",
+                match moves {
+                    true => "area lights of shapes that move are left out, as in pbrt-v3",
+                    false => "area lights of objects are left out: in pbrt-v3 they light nothing",
+                },
             );
         }
         let (geometry, mesh_file) = match source {
@@ -105,7 +99,50 @@ impl Builder<'_> {
         if shape.area_light.is_some() && matches!(shape.alpha, Some(Param::Constant(_))) {
             report.unsupported(at, "an invisible light (\"alpha\" 0) is");
         }
-        if moves {
+        self.add(at, shape, mesh_file, &place, report);
+    }
+
+    /// Where the current shape is. `None`: a mistake was reported.
+    fn place(&self, at: Span, report: &mut Report) -> Option<Place> {
+        let transforms = self.state.now.transforms;
+        let is_of_object = self.state.now.object.is_some();
+        if transforms.is_animated() && is_of_object {
+            report.unsupported(at, "moving shapes within objects are");
+        }
+        let moves = transforms.is_animated() && !is_of_object;
+        let to_world = match is_of_object {
+            true => transforms.start,
+            false if moves => DMat4::IDENTITY,
+            false => self.to_origin(transforms.start),
+        };
+        if !transform::is_invertible(&to_world) {
+            report.error_once(at, SINGULAR, Some(SINGULAR_HELP));
+            return None;
+        }
+        // Objects come to the origin by their instances.
+        let is_near = is_of_object || moves || self.options.origin == DVec3::ZERO;
+        let middle = match is_near {
+            true => DVec3::ZERO,
+            false => to_world.inverse().transform_point3(DVec3::ZERO),
+        };
+        Some(Place {
+            to_world,
+            middle,
+            is_of_object,
+            moves,
+        })
+    }
+
+    /// Adds a shape to the scene or to the open object, whose mesh may still be in a file.
+    fn add(
+        &mut self,
+        at: Span,
+        shape: Shape,
+        mesh_file: Option<MeshFile>,
+        place: &Place,
+        report: &mut Report,
+    ) {
+        if place.moves {
             let is_sphere = matches!(shape.geometry, Geometry::Sphere(_));
             let Some(instance) = self.instance(at, self.objects.len(), is_sphere, report) else {
                 return;
@@ -114,7 +151,7 @@ impl Builder<'_> {
             self.instances.push(instance);
         }
         // Objects are never nested, so the last one is the open one.
-        let object = (is_of_object || moves).then(|| self.objects.len() - 1);
+        let object = (place.is_of_object || place.moves).then(|| self.objects.len() - 1);
         let shapes = match object {
             Some(object) => &mut self.objects[object].shapes,
             None => &mut self.shapes,

@@ -26,8 +26,7 @@ pub(super) fn realistic(lookup: &mut Lookup, report: &mut Report) -> Camera {
     let diameter = lookup.float_in("aperturediameter", 1.0, positive, report);
     let focus_distance = lookup.float_in("focusdistance", 10.0, positive, report);
     let is_simple = lookup.bool("simpleweighting", true, report);
-    let Some((name, span)) = lookup.string("lensfile", report) else {
-        lookup.report_missing("lensfile", "string", report);
+    let Some((name, span)) = lookup.needed_string("lensfile", report) else {
         return Camera::default();
     };
     let Some(mut elements) = read(name, span, report) else {

@@ -19,10 +19,7 @@ pub(super) fn bilinear_mesh(
     report: &mut Report,
 ) -> Option<TriangleMesh> {
     let errors_before = report.error_count();
-    let points = lookup.find("P", &[ParamType::Point3]);
-    if points.is_none() {
-        lookup.report_missing("P", "point3", report);
-    }
+    let points = lookup.needed("P", &[ParamType::Point3], "point3", report);
     let normals = lookup.find("N", &[ParamType::Normal]);
     let uvs = lookup.find("uv", UV);
     let indices = lookup.find("indices", &[ParamType::Integer]);

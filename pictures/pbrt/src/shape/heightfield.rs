@@ -15,16 +15,10 @@ const MAX_SIDE: u32 = 1 << 16;
 pub(super) fn heightfield(lookup: &mut Lookup, report: &mut Report) -> Option<TriangleMesh> {
     let errors_before = report.error_count();
     let [nu, nv] = ["nu", "nv"].map(|name| {
-        if lookup.find(name, &[ParamType::Integer]).is_none() {
-            lookup.report_missing(name, "integer", report);
-        }
+        lookup.needed(name, &[ParamType::Integer], "integer", report);
         lookup.integer_in(name, 2, [2, MAX_SIDE], report)
     });
-    let heights = lookup.find("Pz", &[ParamType::Float]);
-    if heights.is_none() {
-        lookup.report_missing("Pz", "float", report);
-    }
-    let heights = heights?;
+    let heights = lookup.needed("Pz", &[ParamType::Float], "float", report)?;
     let Values::Floats(values) = &heights.values else {
         return None;
     };

@@ -60,10 +60,7 @@ pub(super) fn ply_mesh(
     (to_world, middle): (&DMat4, DVec3),
     report: &mut Report,
 ) -> Option<MeshFile> {
-    let Some((name, at)) = lookup.string("filename", report) else {
-        lookup.report_missing("filename", "string", report);
-        return None;
-    };
+    let (name, at) = lookup.needed_string("filename", report)?;
     Some(MeshFile {
         name: name.to_owned(),
         path: report.sources.folder.join(name),
@@ -80,20 +77,12 @@ pub(super) fn triangle_mesh(
     report: &mut Report,
 ) -> Option<TriangleMesh> {
     let errors_before = report.error_count();
-    let indices = lookup.find("indices", &[ParamType::Integer]);
-    let points = lookup.find("P", &[ParamType::Point3]);
+    let indices = lookup.needed("indices", &[ParamType::Integer], "integer", report);
+    let points = lookup.needed("P", &[ParamType::Point3], "point", report);
     let normals = lookup.find("N", &[ParamType::Normal]);
     let tangents = lookup.find("S", &[ParamType::Vector3]);
     let uvs = lookup.find("uv", UV).or_else(|| lookup.find("st", UV));
-    if indices.is_none() {
-        lookup.report_missing("indices", "integer", report);
-    }
-    if points.is_none() {
-        lookup.report_missing("P", "point", report);
-    }
-    let (Some(indices), Some(points)) = (indices, points) else {
-        return None;
-    };
+    let (indices, points) = (indices?, points?);
     let (Values::Integers(index_values), Values::Points(point_values)) =
         (&indices.values, &points.values)
     else {
@@ -124,10 +113,7 @@ pub(super) fn triangle_mesh(
             .chunks_exact(3)
             .map(|p| (DVec3::from_slice(p) - middle).as_vec3().to_array())
             .collect(),
-        indices: index_values
-            .chunks_exact(3)
-            .map(|t| [t[0] as u32, t[1] as u32, t[2] as u32])
-            .collect(),
+        indices: triangles(index_values).collect(),
         normals: triples(&floats(normals, 3))
             .map(|n| transform::unit(DVec3::from(n.map(f64::from))))
             .collect(),
@@ -153,22 +139,16 @@ pub(super) fn subdivided(
     let levels = lookup.integer_in("levels", older, [0, MAX_LEVELS], report);
     // There is one.
     lookup.choice("scheme", [("loop", ())], report);
-    let indices = lookup.find("indices", &[ParamType::Integer]);
-    let points = lookup.find("P", &[ParamType::Point3]);
-    if indices.is_none() {
-        lookup.report_missing("indices", "integer", report);
-    }
-    if points.is_none() {
-        lookup.report_missing("P", "point", report);
-    }
+    let indices = lookup.needed("indices", &[ParamType::Integer], "integer", report);
+    let points = lookup.needed("P", &[ParamType::Point3], "point", report);
+    let (indices, points) = (indices?, points?);
     let (Values::Integers(index_values), Values::Points(point_values)) =
-        (&indices?.values, &points?.values)
+        (&indices.values, &points.values)
     else {
         return None;
     };
-    let of_triangles = (3, "triangles");
     let count = point_values.len() / 3;
-    check_indices(indices?, index_values, of_triangles, count, report);
+    check_indices(indices, index_values, (3, "triangles"), count, report);
     let bytes = (index_values.len() as u64 / 3)
         .checked_mul(1 << (2 * levels))
         .and_then(|triangles| triangles.checked_mul(BYTES_PER_TRIANGLE));
@@ -186,9 +166,7 @@ pub(super) fn subdivided(
         .chunks_exact(3)
         .map(DVec3::from_slice)
         .collect();
-    let triangles = index_values.chunks_exact(3);
-    let triangles = triangles.map(|t| [t[0] as u32, t[1] as u32, t[2] as u32]);
-    let mut surface = match Surface::new(positions, triangles.collect()) {
+    let mut surface = match Surface::new(positions, triangles(index_values).collect()) {
         Ok(surface) => surface,
         Err(NoSurface([from, to])) => {
             let where_ = match from == to {
@@ -218,6 +196,11 @@ pub(super) fn subdivided(
         normals: normals.into_iter().map(transform::unit).collect(),
         ..TriangleMesh::default()
     })
+}
+
+fn triangles(indices: &[i32]) -> impl Iterator<Item = [u32; 3]> + '_ {
+    let triangles = indices.chunks_exact(3);
+    triangles.map(|t| [t[0] as u32, t[1] as u32, t[2] as u32])
 }
 
 fn triples(values: &[f32]) -> impl Iterator<Item = [f32; 3]> + '_ {

@@ -19,7 +19,7 @@ mod subdivision;
 
 use std::sync::Arc;
 
-use antumbra_scene::{Geometry, TriangleMesh};
+use antumbra_scene::Geometry;
 use glam::{DMat4, DVec3};
 
 pub(crate) use mesh::Cutouts;
@@ -27,7 +27,6 @@ use quadric::Tessellation;
 
 use crate::directive::Quoted;
 use crate::mesh_file::MeshFile;
-use crate::suggest;
 use crate::texture::Textured;
 
 /// Supported shapes.
@@ -68,99 +67,64 @@ pub(crate) fn read(
     let now = &values.state.now;
     let is_emitter = now.area_light.is_some() && now.object.is_none();
     let tessellation = Tessellation::of(is_emitter);
-    match kind.text.as_str() {
-        "trianglemesh" => {
-            let cutouts = mesh::cutouts(values);
-            let mesh = mesh::triangle_mesh(values.lookup, middle, values.report)?;
-            let to_world = to_world * DMat4::from_translation(middle);
-            Some((moved(mesh, &to_world), cutouts))
-        }
-        "loopsubdiv" => {
-            let mesh = mesh::subdivided(values.lookup, middle, values.report)?;
-            without_cutouts(moved(mesh, &(to_world * DMat4::from_translation(middle))))
-        }
+    let from_middle = to_world * DMat4::from_translation(middle);
+    // Only meshes given as triangles can have alpha masks, as in pbrt-v3.
+    let cutouts = match kind.text.as_str() {
+        "trianglemesh" | "plymesh" => mesh::cutouts(values),
+        "bilinearmesh" if values.report.is_version4 => mesh::cutouts(values),
+        _ => Cutouts::default(),
+    };
+    let Textured { lookup, report, .. } = values;
+    let (mut mesh, to_world) = match kind.text.as_str() {
+        "trianglemesh" => (mesh::triangle_mesh(lookup, middle, report)?, &from_middle),
+        "loopsubdiv" => (mesh::subdivided(lookup, middle, report)?, &from_middle),
+        "bilinearmesh" if report.is_version4 => (
+            bilinear::bilinear_mesh(lookup, middle, report)?,
+            &from_middle,
+        ),
         "plymesh" => {
-            let cutouts = mesh::cutouts(values);
-            let file = mesh::ply_mesh(values.lookup, (to_world, middle), values.report)?;
-            Some((Source::File(file), cutouts))
-        }
-        "bilinearmesh" if values.report.is_version4 => {
-            let cutouts = mesh::cutouts(values);
-            let mesh = bilinear::bilinear_mesh(values.lookup, middle, values.report)?;
-            let to_world = to_world * DMat4::from_translation(middle);
-            Some((moved(mesh, &to_world), cutouts))
+            let file = mesh::ply_mesh(lookup, (to_world, middle), report)?;
+            return Some((Source::File(file), cutouts));
         }
         "curve" => {
-            let geometry = curve::curve(values.lookup, middle, values.report)?;
+            let mut geometry = curve::curve(lookup, middle, report)?;
             if is_emitter {
-                let at = values.lookup.at;
-                values.report.unsupported(at, "an area light on a curve is");
+                report.unsupported(lookup.at, "an area light on a curve is");
             }
-            let to_world = to_world * DMat4::from_translation(middle);
-            without_cutouts(Source::Here(match geometry {
-                Geometry::Curves(mut curves) => {
-                    Arc::make_mut(&mut curves).transform(&to_world);
-                    Geometry::Curves(curves)
-                }
-                Geometry::Mesh(mut mesh) => {
-                    Arc::make_mut(&mut mesh).transform(&to_world);
-                    Geometry::Mesh(mesh)
-                }
-                Geometry::Sphere(sphere) => Geometry::Sphere(sphere),
-            }))
-        }
-        "cylinder" => {
-            let mesh = quadric::cylinder(values.lookup, tessellation, values.report)?;
-            without_cutouts(moved(mesh, to_world))
-        }
-        "cone" => {
-            let mesh = revolved::cone(values.lookup, tessellation, values.report)?;
-            without_cutouts(moved(mesh, to_world))
-        }
-        "paraboloid" => {
-            let mesh = revolved::paraboloid(values.lookup, tessellation, values.report)?;
-            without_cutouts(moved(mesh, to_world))
-        }
-        "hyperboloid" => {
-            let mesh = revolved::hyperboloid(values.lookup, tessellation, values.report)?;
-            without_cutouts(moved(mesh, to_world))
-        }
-        "heightfield" => {
-            let mesh = heightfield::heightfield(values.lookup, values.report)?;
-            without_cutouts(moved(mesh, to_world))
-        }
-        "nurbs" => {
-            let mesh = nurbs::nurbs(values.lookup, values.report)?;
-            without_cutouts(moved(mesh, to_world))
-        }
-        "disk" => {
-            let mesh = quadric::disk(values.lookup, tessellation, values.report)?;
-            without_cutouts(moved(mesh, to_world))
+            match &mut geometry {
+                Geometry::Curves(curves) => Arc::make_mut(curves).transform(&from_middle),
+                Geometry::Mesh(mesh) => Arc::make_mut(mesh).transform(&from_middle),
+                Geometry::Sphere(_) => {}
+            }
+            return Some((Source::Here(geometry), cutouts));
         }
         "sphere" => {
-            let geometry = sphere::sphere(values.lookup, to_world, tessellation, values.report)?;
-            without_cutouts(Source::Here(geometry))
+            let geometry = sphere::sphere(lookup, to_world, tessellation, report)?;
+            return Some((Source::Here(geometry), cutouts));
         }
+        "cylinder" => (quadric::cylinder(lookup, tessellation, report)?, to_world),
+        "disk" => (quadric::disk(lookup, tessellation, report)?, to_world),
+        "cone" => (revolved::cone(lookup, tessellation, report)?, to_world),
+        "paraboloid" => (
+            revolved::paraboloid(lookup, tessellation, report)?,
+            to_world,
+        ),
+        "hyperboloid" => (
+            revolved::hyperboloid(lookup, tessellation, report)?,
+            to_world,
+        ),
+        "heightfield" => (heightfield::heightfield(lookup, report)?, to_world),
+        "nurbs" => (nurbs::nurbs(lookup, report)?, to_world),
         name => {
-            values.lookup.ignore_all();
-            let known = match values.report.is_version4 {
+            lookup.ignore_all();
+            let known = match report.is_version4 {
                 true => [SUPPORTED, SUPPORTED4].concat(),
                 false => SUPPORTED.to_vec(),
             };
-            let message = format!("unknown shape {name:?}");
-            let help = suggest::help(name, &known);
-            values.report.error_help(kind.span, message, help);
-            None
+            report.unknown(kind.span, "shape", name, &known);
+            return None;
         }
-    }
-}
-
-/// Geometry without alpha masks. Only meshes given as triangles can have them, as in pbrt-v3.
-fn without_cutouts(source: Source) -> Option<(Source, Cutouts)> {
-    Some((source, Cutouts::default()))
-}
-
-fn moved(mut mesh: TriangleMesh, to_world: &DMat4) -> Source {
+    };
     mesh.transform(to_world);
-    Source::Here(Geometry::Mesh(Arc::new(mesh)))
+    Some((Source::Here(Geometry::Mesh(Arc::new(mesh))), cutouts))
 }

@@ -38,18 +38,12 @@ impl Basis {
     ) -> Option<Self> {
         let errors_before = report.error_count();
         for name in [points, order] {
-            if lookup.find(name, &[ParamType::Integer]).is_none() {
-                lookup.report_missing(name, "integer", report);
-            }
+            lookup.needed(name, &[ParamType::Integer], "integer", report);
         }
         let order_name = order;
         let count = lookup.integer_in(points, 2, [2, MAX_POINTS], report) as usize;
         let order = lookup.integer_in(order, 2, [2, MAX_ORDER], report) as usize;
-        let param = lookup.find(knots, &[ParamType::Float]);
-        if param.is_none() {
-            lookup.report_missing(knots, "float", report);
-        }
-        let param = param?;
+        let param = lookup.needed(knots, &[ParamType::Float], "float", report)?;
         let Values::Floats(values) = &param.values else {
             return None;
         };

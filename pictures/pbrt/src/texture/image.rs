@@ -73,10 +73,7 @@ impl Images {
         param: &'static str,
         report: &mut Report,
     ) -> Option<Arc<Image>> {
-        let Some((name, span)) = lookup.string(param, report) else {
-            lookup.report_missing(param, "string", report);
-            return None;
-        };
+        let (name, span) = lookup.needed_string(param, report)?;
         let folder = report.sources.folder.clone();
         self.read_ahead(&folder, &[name], &Allowance::new(self.allowed));
         let id = identity(folder.join(name));

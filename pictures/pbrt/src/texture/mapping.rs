@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3, Vec2};
 use super::TextureSpace;
 use crate::lookup::Lookup;
 use crate::report::Report;
-use crate::{suggest, transform};
+use crate::transform;
 
 /// Kinds of mappings. All mappings of pbrt-v3 are supported.
 pub(crate) const SUPPORTED: &[&str] = &["cylindrical", "planar", "spherical", "uv"];
@@ -68,11 +68,7 @@ pub(super) fn read(
             })
         }
         unknown => {
-            report.error_help(
-                span,
-                format!("unknown mapping {unknown:?}"),
-                suggest::help(unknown, SUPPORTED),
-            );
+            report.unknown(span, "mapping", unknown, SUPPORTED);
             None
         }
     }

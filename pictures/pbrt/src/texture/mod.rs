@@ -311,52 +311,25 @@ fn build<T: Value>(
             let mapping = mapping::read(values.lookup, space, values.report);
             mapping.map(|mapping| Texture::Dots { dots, mapping })
         }
-        "fbm" => {
-            let pattern = NoisePattern::Fbm(octaves(values));
-            Some(noise(pattern, space, values.report))
-        }
-        "wrinkled" => {
-            let pattern = NoisePattern::Wrinkled(octaves(values));
-            Some(noise(pattern, space, values.report))
-        }
-        "windy" => Some(noise(NoisePattern::Windy, space, values.report)),
         // pbrt-v3 has none of numbers, and says so where one is used.
         name @ ("marble" | "uv") if T::NAME == f32::NAME => {
             values.lookup.ignore_all();
             return Definition::Unsupported(format!("{name} of numbers"));
         }
-        "marble" => {
-            let pattern = NoisePattern::Marble {
-                octaves: octaves(values),
-                scale: values.constant("scale", 1.0),
-                variation: values.constant("variation", 0.2),
-            };
-            Some(noise(pattern, space, values.report))
-        }
+        "fbm" | "marble" | "windy" | "wrinkled" => Some(Texture::Noise {
+            pattern: pattern(&class.text, values),
+            texture_from_world: space.of_noise(values.report),
+        }),
         "uv" => mapping::read(values.lookup, space, values.report).map(Texture::Uv),
-        "imagemap" => {
-            let texture = image_map(values, space, images).map(Texture::Image);
-            let Textured { lookup, report, .. } = values;
-            if report.is_version4 && lookup.bool("invert", false, report) {
-                let inverted = texture.map(T::inverted);
-                if inverted.as_ref().is_some_and(Option::is_none) {
-                    report.unsupported(lookup.at, "\"invert\" of an image of colours is");
-                }
-                inverted.flatten()
-            } else {
-                texture
-            }
-        }
+        "imagemap" => image_texture(values, space, images),
         name => {
             values.lookup.ignore_all();
             if UNSUPPORTED.contains(&name) {
                 return Definition::Unsupported(name.to_owned());
             }
-            values.report.error_help(
-                class.span,
-                format!("unknown texture class {name:?}"),
-                suggest::help(name, SUPPORTED),
-            );
+            values
+                .report
+                .unknown(class.span, "texture class", name, SUPPORTED);
             None
         }
     };
@@ -397,10 +370,17 @@ fn checkerboard<T: Value>(values: &mut Textured, space: &TextureSpace) -> Option
     })
 }
 
-fn noise<T>(pattern: NoisePattern, space: &TextureSpace, report: &Report) -> Texture<T> {
-    Texture::Noise {
-        pattern,
-        texture_from_world: space.of_noise(report),
+/// Pattern of noise of a class.
+fn pattern(class: &str, values: &mut Textured) -> NoisePattern {
+    match class {
+        "fbm" => NoisePattern::Fbm(octaves(values)),
+        "wrinkled" => NoisePattern::Wrinkled(octaves(values)),
+        "marble" => NoisePattern::Marble {
+            octaves: octaves(values),
+            scale: values.constant("scale", 1.0),
+            variation: values.constant("variation", 0.2),
+        },
+        _ => NoisePattern::Windy,
     }
 }
 
@@ -410,6 +390,24 @@ fn octaves(values: &mut Textured) -> Octaves {
         count: lookup.integer_in("octaves", 8, [0, MAX_OCTAVES], report),
         roughness: lookup.float("roughness", 0.5, report),
     }
+}
+
+/// Image, in pbrt-v4 perhaps inverted. `None`: a mistake was reported.
+fn image_texture<T: Value>(
+    values: &mut Textured,
+    space: &TextureSpace,
+    images: &mut Images,
+) -> Option<Texture<T>> {
+    let texture = image_map(values, space, images).map(Texture::Image);
+    let Textured { lookup, report, .. } = values;
+    if !report.is_version4 || !lookup.bool("invert", false, report) {
+        return texture;
+    }
+    let inverted = texture.map(T::inverted);
+    if inverted.as_ref().is_some_and(Option::is_none) {
+        report.unsupported(lookup.at, "\"invert\" of an image of colours is");
+    }
+    inverted.flatten()
 }
 
 fn image_map(

@@ -16,7 +16,6 @@ use crate::params::{ParamType, Params, Values};
 use crate::report::Report;
 use crate::source::Span;
 use crate::state::State;
-use crate::suggest;
 use crate::texture::{self, TextureSpace};
 
 /// Directives that only version 4 has.
@@ -516,8 +515,7 @@ pub(crate) fn color_space(name: &Quoted, report: &mut Report) -> Option<DMat3> {
     let Some((known, primaries)) = COLOR_SPACES.iter().find(|(known, _)| *known == name.text)
     else {
         let known: Vec<&str> = COLOR_SPACES.iter().map(|(known, _)| *known).collect();
-        let message = format!("unknown colour space {:?}", name.text);
-        report.error_help(name.span, message, suggest::help(&name.text, &known));
+        report.unknown(name.span, "colour space", &name.text, &known);
         return None;
     };
     (*known != "srgb").then(|| {
@@ -537,8 +535,7 @@ pub(crate) fn attribute(group: Quoted, params: Params, state: &mut State, report
     if GROUPS.contains(&group.text.as_str()) {
         state.now.attributes.push((group.text, Arc::new(params)));
     } else {
-        let message = format!("unknown group of attributes {:?}", group.text);
-        report.error_help(group.span, message, suggest::help(&group.text, GROUPS));
+        report.unknown(group.span, "group of attributes", &group.text, GROUPS);
     }
 }
 
