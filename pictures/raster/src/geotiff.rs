@@ -43,15 +43,7 @@ pub fn read(
             "it says nowhere where it is; wanted tags of GeoTIFF, or a world file of the same name with the extension .tfw",
         )?,
     };
-    let no_data = match string(&mut decoder, Tag::GdalNodata)
-        .as_deref()
-        .map(str::trim)
-    {
-        None | Some("") => None,
-        Some(text) => Some(text.parse::<f64>().map_err(|_| {
-            format!("its mark of cells without data (tag GDAL_NODATA) is `{text}`, wanted a number")
-        })?),
-    };
+    let no_data = no_data(&mut decoder)?;
     let notes = string(&mut decoder, Tag::Unknown(GDAL_METADATA)).unwrap_or_default();
     let [mut scale, mut offset] = scale_and_offset(&notes)?;
     // Heights in the unit of the ground, if both are known.
@@ -74,32 +66,19 @@ pub fn read(
             f64::NAN
         };
     }
-    let outer;
-    let masked = match inner {
-        Some(directory) => Some(Page::new(bytes, &mut decoder, &directory, &check)?),
+    let mask = match inner {
+        Some(directory) => Some(mask(bytes, &mut decoder, &directory, &page, &check)?),
         None => match (beside.mask)()? {
-            Some(bytes) => {
-                outer = bytes;
+            Some(outer) => {
                 let (mut decoder, directory, _) = pages(&outer)?;
-                Some(Page::new(&outer, &mut decoder, &directory, &check)?)
+                Some(mask(&outer, &mut decoder, &directory, &page, &check)?)
             }
             None => None,
         },
     };
-    if let Some(mask) = masked {
-        if mask.size != page.size {
-            let [columns, rows] = mask.size;
-            return Err(format!(
-                "its mask has {columns} x {rows} cells, wanted {width} x {height}"
-            ));
-        }
-        let mask = mask
-            .values(0.0)
-            .map_err(|reason| format!("mask: {reason}"))?;
-        for (value, mask) in values.iter_mut().zip(mask) {
-            if mask == 0.0 {
-                *value = f64::NAN;
-            }
+    for (value, mask) in values.iter_mut().zip(mask.into_iter().flatten()) {
+        if mask == 0.0 {
+            *value = f64::NAN;
         }
     }
     Ok(Raster {
@@ -112,6 +91,34 @@ pub fn read(
         values,
         height_factor,
     })
+}
+
+/// Values of a mask, which has the size of its page.
+fn mask<'a>(
+    bytes: &'a [u8],
+    decoder: &mut Bytes<'a>,
+    directory: &Directory,
+    page: &Page<'_>,
+    check: impl Fn([usize; 2]) -> Result<(), String>,
+) -> Result<Vec<f64>, String> {
+    let mask = Page::new(bytes, decoder, directory, check)?;
+    if mask.size != page.size {
+        let ([columns, rows], [width, height]) = (mask.size, page.size);
+        return Err(format!(
+            "its mask has {columns} x {rows} cells, wanted {width} x {height}"
+        ));
+    }
+    (mask.values(0.0)).map_err(|reason| format!("mask: {reason}"))
+}
+
+/// The mark of cells without data, if the file has one.
+fn no_data(decoder: &mut Bytes<'_>) -> Result<Option<f64>, String> {
+    match string(decoder, Tag::GdalNodata).as_deref().map(str::trim) {
+        None | Some("") => Ok(None),
+        Some(text) => text.parse().map(Some).map_err(|_| {
+            format!("its mark of cells without data (tag GDAL_NODATA) is `{text}`, wanted a number")
+        }),
+    }
 }
 
 /// A decoder of tags, the directory of the first page, and the directory of its mask.

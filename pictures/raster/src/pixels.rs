@@ -77,17 +77,8 @@ impl<'a> Page<'a> {
         let colours = number(Tag::PhotometricInterpretation, 1)?;
         let bits = number(Tag::BitsPerSample, 1)? as usize;
         let format = number(Tag::SampleFormat, 1)? as u16;
-        let kind = match (format, bits) {
-            _ if samples != 1 => Err(format!("{samples} bands")),
-            // White is 0, black is 0, or a mask: hints how to show a band, which leave its numbers alone.
-            _ if !matches!(colours, 0 | 1 | 4) => Err("colours".into()),
-            (UNSIGNED, 1..=16 | 32 | 64) | (SIGNED, 8 | 16 | 32 | 64) | (FLOAT, 16 | 32 | 64) => {
-                Ok(())
-            }
-            (5 | 6, _) => Err("complex numbers".into()),
-            _ => Err(format!("{bits} bits of the sample format {format}")),
-        };
-        kind.map_err(|found| format!("found pixels of {found}, wanted one band of numbers"))?;
+        is_one_band(samples, colours, (format, bits))
+            .map_err(|found| format!("found pixels of {found}, wanted one band of numbers"))?;
         if number(Tag::FillOrder, 1)? != 1 {
             return Err("its bits are stored in reverse order (tag FillOrder)".into());
         }
@@ -100,15 +91,14 @@ impl<'a> Page<'a> {
             _ => return Err(format!("found predictor {predictor} of {bits} bits")),
         }
         let is_tiled = directory.contains(Tag::TileOffsets);
-        let chunk = match is_tiled {
-            true => [
-                number(Tag::TileWidth, 0)? as usize,
-                number(Tag::TileLength, 0)? as usize,
-            ],
-            false => {
-                let rows = number(Tag::RowsPerStrip, u32::MAX.into())? as usize;
-                [size[0], rows.min(size[1])]
-            }
+        let (chunk, [offsets, counts]) = if is_tiled {
+            let [width, length] = [Tag::TileWidth, Tag::TileLength].map(|tag| number(tag, 0));
+            let chunk = [width? as usize, length? as usize];
+            (chunk, [Tag::TileOffsets, Tag::TileByteCounts])
+        } else {
+            let rows = number(Tag::RowsPerStrip, u32::MAX.into())? as usize;
+            let chunk = [size[0], rows.min(size[1])];
+            (chunk, [Tag::StripOffsets, Tag::StripByteCounts])
         };
         if chunk.contains(&0) {
             return Err("its strips or tiles have no size".into());
@@ -116,10 +106,6 @@ impl<'a> Page<'a> {
         if is_tiled {
             check(chunk).map_err(|reason| format!("tiles: {reason}"))?;
         }
-        let [offsets, counts] = match is_tiled {
-            true => [Tag::TileOffsets, Tag::TileByteCounts],
-            false => [Tag::StripOffsets, Tag::StripByteCounts],
-        };
         let page = Self {
             bytes,
             is_big_endian,
@@ -280,6 +266,18 @@ impl<'a> Page<'a> {
             }
             *value = number(word);
         }
+    }
+}
+
+/// Checks that pixels are one number each. The error says what they are.
+fn is_one_band(samples: u32, colours: u32, kind: (u16, usize)) -> Result<(), String> {
+    match kind {
+        _ if samples != 1 => Err(format!("{samples} bands")),
+        // White is 0, black is 0, or a mask: hints how to show a band, which leave its numbers alone.
+        _ if !matches!(colours, 0 | 1 | 4) => Err("colours".into()),
+        (UNSIGNED, 1..=16 | 32 | 64) | (SIGNED, 8 | 16 | 32 | 64) | (FLOAT, 16 | 32 | 64) => Ok(()),
+        (5 | 6, _) => Err("complex numbers".into()),
+        (format, bits) => Err(format!("{bits} bits of the sample format {format}")),
     }
 }
 

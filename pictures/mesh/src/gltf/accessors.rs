@@ -100,38 +100,12 @@ pub(super) fn read<const N: usize, T>(
         }))
     };
     let (size, count) = (accessor.size(), accessor.count());
-    let sparse = accessor.sparse().map(|sparse| {
-        let (from, to) = (sparse.indices(), sparse.values());
-        let kind = match from.index_type() {
-            IndexType::U8 => DataType::U8,
-            IndexType::U16 => DataType::U16,
-            IndexType::U32 => DataType::U32,
-        };
-        let list = [
-            (from.view(), from.offset(), kind.size()),
-            (to.view(), to.offset(), size),
-        ];
-        let [places, values] = list.map(|(view, offset, size)| {
-            rows(
-                buffers,
-                &view,
-                index,
-                (offset, sparse.count(), size),
-                Some(size),
-            )
-        });
-        Ok::<_, String>((kind, places?, values?))
-    });
-    let sparse = sparse.transpose()?;
+    // Checked before the elements are read.
+    let changes = changes(buffers, accessor)?;
     let mut elements: Vec<T> = match accessor.view() {
         Some(view) => {
-            let rows = rows(
-                buffers,
-                &view,
-                index,
-                (accessor.offset(), count, size),
-                None,
-            )?;
+            let place = (accessor.offset(), count, size);
+            let rows = rows(buffers, &view, index, place, None)?;
             rows.map(element).collect()
         }
         None => {
@@ -142,16 +116,41 @@ pub(super) fn read<const N: usize, T>(
             zeros
         }
     };
-    if let Some((kind, places, values)) = sparse {
-        for (place, value) in places.zip(values) {
-            let place = plain(kind, place) as usize;
-            let slot = elements.get_mut(place).ok_or_else(|| {
-                format!("accessor {index} has {count} elements, but its sparse list changes element {place}")
-            })?;
-            *slot = element(value);
-        }
+    for (place, value) in changes.into_iter().flatten() {
+        let slot = elements.get_mut(place).ok_or_else(|| {
+            format!(
+                "accessor {index} has {count} elements, but its sparse list changes element {place}"
+            )
+        })?;
+        *slot = element(value);
     }
     Ok(elements)
+}
+
+/// Elements that the sparse list of an accessor changes, with their bytes.
+fn changes<'a>(
+    buffers: &'a [Cow<'_, [u8]>],
+    accessor: &Accessor,
+) -> Result<Option<impl Iterator<Item = (usize, &'a [u8])> + use<'a>>, String> {
+    let Some(sparse) = accessor.sparse() else {
+        return Ok(None);
+    };
+    let (from, to) = (sparse.indices(), sparse.values());
+    let kind = match from.index_type() {
+        IndexType::U8 => DataType::U8,
+        IndexType::U16 => DataType::U16,
+        IndexType::U32 => DataType::U32,
+    };
+    let list = [
+        (from.view(), from.offset(), kind.size()),
+        (to.view(), to.offset(), accessor.size()),
+    ];
+    let [places, values] = list.map(|(view, offset, size)| {
+        let place = (offset, sparse.count(), size);
+        rows(buffers, &view, accessor.index(), place, Some(size))
+    });
+    let places = places?.map(move |place| plain(kind, place) as usize);
+    Ok(Some(places.zip(values?)))
 }
 
 /// Rows of a view for an accessor, all within their buffer: from an offset, so many, of so many bytes. `stride` is the

@@ -187,6 +187,21 @@ impl<'a> Looks<'a> {
     }
 }
 
+/// Glass of a perceptual roughness, whose square is alpha.
+fn glass(color: Param<Rgb>, roughness: &Param<f32>, eta: f32) -> Material {
+    let alpha = match roughness {
+        Param::Constant(value) => Param::Constant(value * value),
+        texture => Param::Texture(Arc::new(Texture::Scale([texture.clone(), texture.clone()]))),
+    };
+    Material::Glass(Glass {
+        kr: Rgb::ONE.into(),
+        kt: color,
+        eta: eta.max(1.0).into(),
+        roughness: [alpha.clone(), alpha],
+        remap_roughness: false,
+    })
+}
+
 /// A material that is being read.
 struct Surface<'s, 'a> {
     looks: &'s mut Looks<'a>,
@@ -252,27 +267,11 @@ impl Surface<'_, '_> {
         };
         let roughness = channel(1, pbr.roughness_factor());
         let metallic = channel(2, pbr.metallic_factor());
-        let eta = material.ior().unwrap_or(1.5);
-        // Index 0 stands for a mirror in older files.
-        let reflectance = match eta {
-            eta if eta < 1.0 => 1.0,
-            eta => ((eta - 1.0) / (eta + 1.0)) * ((eta - 1.0) / (eta + 1.0)),
-        };
-        let mut coat = Rgb::splat(reflectance);
-        if let Some(specular) = material.specular() {
-            coat = (coat * Rgb::from(specular.specular_color_factor())).min(Rgb::ONE)
-                * specular.specular_factor();
-            if specular.specular_texture().is_some() || specular.specular_color_texture().is_some()
-            {
-                self.looks
-                    .note("textures of KHR_materials_specular are left out");
-            }
-        }
         let mut opaque = Material::Metallic(Metallic {
             color: color.clone(),
             metallic,
             roughness: roughness.clone(),
-            coat: coat.into(),
+            coat: self.coat(material).into(),
             transmission: 0.0.into(),
         });
         let Some(clear) = material.transmission() else {
@@ -306,32 +305,39 @@ impl Surface<'_, '_> {
             self.looks
                 .note("attenuation inside volumes is left out: only the base colour tints glass");
         }
-        let alpha = match &roughness {
-            Param::Constant(value) => Param::Constant(value * value),
-            texture => Param::Texture(Arc::new(Texture::Scale([texture.clone(), texture.clone()]))),
-        };
-        let glass = Material::Glass(Glass {
-            kr: Rgb::ONE.into(),
-            kt: color,
-            eta: eta.max(1.0).into(),
-            roughness: [alpha.clone(), alpha],
-            remap_roughness: false,
-        });
-        match share {
-            Param::Constant(share) if share >= 1.0 => glass,
-            Param::Constant(share) => Material::Mix(Mix {
-                materials: [Arc::new(glass), Arc::new(opaque)],
-                amount: Rgb::splat(share).into(),
-            }),
+        let glass = glass(color, &roughness, material.ior().unwrap_or(1.5));
+        let share = match share {
+            Param::Constant(share) if share >= 1.0 => return glass,
+            Param::Constant(share) => share,
             Param::Texture(_) => {
                 self.looks
                     .note("textures of transmission are left out where there is a volume");
-                Material::Mix(Mix {
-                    materials: [Arc::new(glass), Arc::new(opaque)],
-                    amount: Rgb::splat(factor).into(),
-                })
+                factor
             }
+        };
+        Material::Mix(Mix {
+            materials: [Arc::new(glass), Arc::new(opaque)],
+            amount: Rgb::splat(share).into(),
+        })
+    }
+
+    /// Reflectance of the surface of a dielectric at normal incidence.
+    fn coat(&mut self, material: &gltf::Material) -> Rgb {
+        // Index 0 stands for a mirror in older files.
+        let reflectance = match material.ior().unwrap_or(1.5) {
+            eta if eta < 1.0 => 1.0,
+            eta => ((eta - 1.0) / (eta + 1.0)) * ((eta - 1.0) / (eta + 1.0)),
+        };
+        let coat = Rgb::splat(reflectance);
+        let Some(specular) = material.specular() else {
+            return coat;
+        };
+        if specular.specular_texture().is_some() || specular.specular_color_texture().is_some() {
+            self.looks
+                .note("textures of KHR_materials_specular are left out");
         }
+        (coat * Rgb::from(specular.specular_color_factor())).min(Rgb::ONE)
+            * specular.specular_factor()
     }
 
     fn normal_mapped(&mut self, material: &gltf::Material, made: Material) -> Material {

@@ -238,37 +238,7 @@ type Contents = (Document, Option<Vec<u8>>, Needs);
 
 /// Reads the JSON of a file, with all references checked that the shown scene needs, and its binary chunk.
 fn document(bytes: &[u8], looks: bool) -> Result<Contents, Vec<String>> {
-    // The crate subtracts the size of the header from the stated length without a check.
-    if bytes.is_empty() {
-        return Err(vec!["the file is empty".to_owned()]);
-    }
-    let is_glb = bytes.starts_with(b"glTF");
-    let number = |place: usize| {
-        let bytes = bytes.get(place..).and_then(<[u8]>::first_chunk::<4>);
-        bytes.map(|&bytes| u32::from_le_bytes(bytes))
-    };
-    if is_glb && number(8).is_none_or(|length| length < 12) {
-        return Err(vec!["the GLB is shorter than its header".to_owned()]);
-    }
-    if is_glb && number(4) == Some(1) {
-        return Err(of_version("1.0"));
-    }
-    let (text, binary) = match is_glb {
-        true => match Glb::from_slice(bytes) {
-            Ok(glb) => (glb.json, glb.bin.map(Cow::into_owned)),
-            Err(error) => {
-                let (is, stated) = (bytes.len() as u64, number(8).unwrap_or_default());
-                return Err(vec![match error {
-                    _ if is < stated.into() => {
-                        format!("the file ends early: {is} of {stated} bytes are there")
-                    }
-                    ::gltf::Error::Binary(error) => format!("GLB: {error}"),
-                    error => error.to_string(),
-                }]);
-            }
-        },
-        false => (Cow::Borrowed(bytes), None),
-    };
+    let (text, binary) = container(bytes)?;
     let mut json = root(antumbra_scene::without_mark(&text))?;
     let required = std::mem::take(&mut json.extensions_required);
     if let Some(name) = required
@@ -322,6 +292,44 @@ fn document(bytes: &[u8], looks: bool) -> Result<Contents, Vec<String>> {
     match mistakes.is_empty() {
         true => Ok((Document::from_json_without_validation(json), binary, needs)),
         false => Err(mistakes),
+    }
+}
+
+/// The JSON of a file, and the binary data of a GLB.
+type Container<'a> = (Cow<'a, [u8]>, Option<Vec<u8>>);
+
+/// Takes a GLB apart. Other files are JSON as a whole.
+fn container(bytes: &[u8]) -> Result<Container<'_>, Vec<String>> {
+    // The crate subtracts the size of the header from the stated length without a check.
+    if bytes.is_empty() {
+        return Err(vec!["the file is empty".to_owned()]);
+    }
+    let is_glb = bytes.starts_with(b"glTF");
+    let number = |place: usize| {
+        let bytes = bytes.get(place..).and_then(<[u8]>::first_chunk::<4>);
+        bytes.map(|&bytes| u32::from_le_bytes(bytes))
+    };
+    if is_glb && number(8).is_none_or(|length| length < 12) {
+        return Err(vec!["the GLB is shorter than its header".to_owned()]);
+    }
+    if is_glb && number(4) == Some(1) {
+        return Err(of_version("1.0"));
+    }
+    if !is_glb {
+        return Ok((Cow::Borrowed(bytes), None));
+    }
+    match Glb::from_slice(bytes) {
+        Ok(glb) => Ok((glb.json, glb.bin.map(Cow::into_owned))),
+        Err(error) => {
+            let (is, stated) = (bytes.len() as u64, number(8).unwrap_or_default());
+            Err(vec![match error {
+                _ if is < stated.into() => {
+                    format!("the file ends early: {is} of {stated} bytes are there")
+                }
+                ::gltf::Error::Binary(error) => format!("GLB: {error}"),
+                error => error.to_string(),
+            }])
+        }
     }
 }
 

@@ -77,107 +77,27 @@ impl Looks {
         mistakes: &mut Mistakes,
     ) -> Self {
         let mut maps = Maps { images, mistakes };
-        let map_kd = maps.color(mtl.map_kd.as_ref());
-        let factor = match (mtl.kd, &mtl.map_kd) {
-            (None, None) => PLAIN_GREY,
-            (None, Some(_)) => Rgb::ONE,
-            // Writers that leave the colour to the image. The product would be black.
-            (Some(Rgb::ZERO), Some(_)) => Rgb::ONE,
-            (Some(kd), _) => kd,
-        };
-        let mut kd = match (&mtl.map_kd, map_kd) {
-            (Some(_), None) => (factor * PLAIN_GREY).into(),
-            (_, map_kd) => times(factor, Rgb::ONE, map_kd),
-        };
-        if has_colors {
-            let colors = Param::Texture(Arc::new(Texture::VertexColor));
-            kd = Param::Texture(Arc::new(Texture::Scale([kd, colors])));
-        }
+        let kd = maps.base_color(mtl, has_colors);
         let map_ks = maps.color(mtl.map_ks.as_ref());
-        let ks = mtl.ks.unwrap_or(if map_ks.is_some() {
-            Rgb::ONE
-        } else {
-            Rgb::ZERO
-        });
-        let is_physical = [mtl.roughness, mtl.metallic].iter().any(Option::is_some)
-            || mtl.map_roughness.is_some()
-            || mtl.map_metallic.is_some();
-        let (mut is_clear, illum) = (false, mtl.illum);
-        let material = if is_physical {
-            let roughness = maps.number(mtl.map_roughness.as_ref(), mtl.roughness.unwrap_or(1.0));
-            let metallic = maps.number(mtl.map_metallic.as_ref(), mtl.metallic.unwrap_or(1.0));
-            let eta = mtl.ni.filter(|&eta| eta > 1.0).unwrap_or(1.5);
-            let coat = (eta - 1.0) / (eta + 1.0);
-            Material::Metallic(Metallic {
-                color: kd,
-                metallic: metallic.unwrap_or(mtl.metallic.unwrap_or(0.0).into()),
-                roughness: roughness.unwrap_or(mtl.roughness.unwrap_or(0.5).into()),
-                coat: Rgb::splat(coat * coat).into(),
-                transmission: 0.0.into(),
-            })
-        } else if matches!(illum, Some(4 | 6 | 7 | 9)) {
-            is_clear = true;
-            Material::Glass(Glass {
-                kr: Rgb::ONE.into(),
-                kt: mtl.tf.unwrap_or(Rgb::ONE).into(),
-                eta: mtl.ni.filter(|&eta| eta > 0.0).unwrap_or(1.5).into(),
-                roughness: [0.0.into(), 0.0.into()],
-                remap_roughness: false,
-            })
-        } else if ks.max_element() > 0.0 && !matches!(illum, Some(0 | 1)) {
-            let ks = ks.clamp(Rgb::ZERO, Rgb::ONE);
-            let is_mirror = matches!(illum, Some(3 | 5 | 8));
-            let usual = if is_mirror {
-                MIRROR_EXPONENT
-            } else {
-                USUAL_EXPONENT
-            };
-            let alpha = alpha_of_exponent(mtl.ns.unwrap_or(usual));
-            if is_mirror {
-                Material::Substrate(Substrate {
-                    kd,
-                    ks: times(ks, Rgb::ONE, map_ks),
-                    roughness: [alpha.into(), alpha.into()],
-                    remap_roughness: false,
-                })
-            } else {
-                let is_metal = kd.constant() == Some(&Rgb::ZERO) && ks.max_element() > METAL;
-                let (color, coat) = match is_metal {
-                    true => (times(ks, Rgb::ONE, map_ks), Param::Constant(Rgb::ZERO)),
-                    false => (kd, times(COAT * ks, Rgb::ONE, map_ks)),
-                };
-                Material::Metallic(Metallic {
-                    color,
-                    metallic: f32::from(u8::from(is_metal)).into(),
-                    // Perceptual roughness, whose square is alpha.
-                    roughness: alpha.sqrt().into(),
-                    coat,
-                    transmission: 0.0.into(),
-                })
-            }
-        } else {
-            Material::Matte(Matte {
-                kd,
-                sigma: 0.0.into(),
-            })
-        };
-        if let Some(kind) = illum.filter(|&kind| kind > 9) {
+        let ks = factor(mtl.ks, &map_ks);
+        let kind = Kind::of(mtl, ks);
+        let material = maps.material(mtl, kind, kd, (ks, map_ks));
+        if let Some(kind) = mtl.illum.filter(|&kind| kind > 9) {
             model.note(format!("`illum {kind}` is taken as `illum 2`"));
         }
         let material = maps.bumps(mtl, material);
         let map_ke = maps.color(mtl.map_ke.as_ref());
-        let ke = mtl.ke.unwrap_or(if map_ke.is_some() {
-            Rgb::ONE
-        } else {
-            Rgb::ZERO
-        });
+        let ke = factor(mtl.ke, &map_ke);
         let emission = (ke.max_element() > 0.0).then_some(AreaLight {
             radiance: ke,
             texture: map_ke,
             two_sided: true,
             samples: 1,
         });
-        let opacity = if is_clear { 1.0 } else { mtl.opacity() };
+        let opacity = match kind {
+            Kind::Glass => 1.0,
+            _ => mtl.opacity(),
+        };
         let map_d = maps.load(mtl.map_d.as_ref(), Channel::AlphaOrGrey);
         let alpha = match map_d {
             Some((loaded, laid)) => Some(loaded.number(laid, opacity)),
@@ -189,6 +109,41 @@ impl Looks {
             material,
             emission,
             alpha,
+        }
+    }
+}
+
+/// Factor of a map: the colour that is given, or else 1 if there is a map, and 0 if there is none.
+fn factor(given: Option<Rgb>, map: &Option<Param<Rgb>>) -> Rgb {
+    given.unwrap_or(match map {
+        Some(_) => Rgb::ONE,
+        None => Rgb::ZERO,
+    })
+}
+
+/// Kind of a surface, by the table of this file.
+#[derive(Clone, Copy)]
+enum Kind {
+    Physical,
+    Glass,
+    Mirror,
+    /// Diffuse under a clear coat, or metal.
+    Coated,
+    Diffuse,
+}
+
+impl Kind {
+    fn of(mtl: &Mtl, ks: Rgb) -> Self {
+        let is_physical = [mtl.roughness, mtl.metallic].iter().any(Option::is_some)
+            || mtl.map_roughness.is_some()
+            || mtl.map_metallic.is_some();
+        match mtl.illum {
+            _ if is_physical => Self::Physical,
+            Some(4 | 6 | 7 | 9) => Self::Glass,
+            Some(0 | 1) => Self::Diffuse,
+            Some(3 | 5 | 8) if ks.max_element() > 0.0 => Self::Mirror,
+            _ if ks.max_element() > 0.0 => Self::Coated,
+            _ => Self::Diffuse,
         }
     }
 }
@@ -225,6 +180,90 @@ impl Maps<'_> {
                 }
                 None
             }
+        }
+    }
+
+    /// Diffuse colour, with the colours of the vertices.
+    fn base_color(&mut self, mtl: &Mtl, has_colors: bool) -> Param<Rgb> {
+        let map_kd = self.color(mtl.map_kd.as_ref());
+        let factor = match (mtl.kd, &mtl.map_kd) {
+            (None, None) => PLAIN_GREY,
+            (None, Some(_)) => Rgb::ONE,
+            // Writers that leave the colour to the image. The product would be black.
+            (Some(Rgb::ZERO), Some(_)) => Rgb::ONE,
+            (Some(kd), _) => kd,
+        };
+        let kd = match (&mtl.map_kd, map_kd) {
+            (Some(_), None) => (factor * PLAIN_GREY).into(),
+            (_, map_kd) => times(factor, Rgb::ONE, map_kd),
+        };
+        if !has_colors {
+            return kd;
+        }
+        let colors = Param::Texture(Arc::new(Texture::VertexColor));
+        Param::Texture(Arc::new(Texture::Scale([kd, colors])))
+    }
+
+    /// Material of a kind, with its diffuse colour and the colour of its highlight.
+    fn material(
+        &mut self,
+        mtl: &Mtl,
+        kind: Kind,
+        kd: Param<Rgb>,
+        (ks, map_ks): (Rgb, Option<Param<Rgb>>),
+    ) -> Material {
+        let ks = ks.clamp(Rgb::ZERO, Rgb::ONE);
+        match kind {
+            Kind::Physical => {
+                let roughness =
+                    self.number(mtl.map_roughness.as_ref(), mtl.roughness.unwrap_or(1.0));
+                let metallic = self.number(mtl.map_metallic.as_ref(), mtl.metallic.unwrap_or(1.0));
+                let eta = mtl.ni.filter(|&eta| eta > 1.0).unwrap_or(1.5);
+                let coat = (eta - 1.0) / (eta + 1.0);
+                Material::Metallic(Metallic {
+                    color: kd,
+                    metallic: metallic.unwrap_or(mtl.metallic.unwrap_or(0.0).into()),
+                    roughness: roughness.unwrap_or(mtl.roughness.unwrap_or(0.5).into()),
+                    coat: Rgb::splat(coat * coat).into(),
+                    transmission: 0.0.into(),
+                })
+            }
+            Kind::Glass => Material::Glass(Glass {
+                kr: Rgb::ONE.into(),
+                kt: mtl.tf.unwrap_or(Rgb::ONE).into(),
+                eta: mtl.ni.filter(|&eta| eta > 0.0).unwrap_or(1.5).into(),
+                roughness: [0.0.into(), 0.0.into()],
+                remap_roughness: false,
+            }),
+            Kind::Mirror => {
+                let alpha = alpha_of_exponent(mtl.ns.unwrap_or(MIRROR_EXPONENT));
+                Material::Substrate(Substrate {
+                    kd,
+                    ks: times(ks, Rgb::ONE, map_ks),
+                    roughness: [alpha.into(), alpha.into()],
+                    remap_roughness: false,
+                })
+            }
+            Kind::Coated => {
+                let alpha = alpha_of_exponent(mtl.ns.unwrap_or(USUAL_EXPONENT));
+                let is_metal = kd.constant() == Some(&Rgb::ZERO) && ks.max_element() > METAL;
+                let (color, coat) = match is_metal {
+                    true => (times(ks, Rgb::ONE, map_ks), Param::Constant(Rgb::ZERO)),
+                    false => (kd, times(COAT * ks, Rgb::ONE, map_ks)),
+                };
+                Material::Metallic(Metallic {
+                    color,
+                    metallic: f32::from(u8::from(is_metal)).into(),
+                    // Perceptual roughness, whose square is alpha.
+                    roughness: alpha.sqrt().into(),
+                    coat,
+                    transmission: 0.0.into(),
+                })
+            }
+            Kind::Diffuse => Material::Matte(Matte {
+                kd,
+                sigma: 0.0.into(),
+            }),
         }
     }
 

@@ -4,6 +4,8 @@
 //! corner, or other triangles if they have inward corners. Points and lines are left out with a note, and everything else
 //! that is not read with a warning.
 //!
+//! The reader is not a crate's: mistakes name line and column, and memory is counted before it is taken.
+//!
 //! - `scan.rs`: words and numbers with their columns
 //! - `faces.rs`: corners of faces, and the meshes that they make
 //! - `mtl.rs`: statements of `.mtl` files
@@ -108,69 +110,17 @@ fn parse_within(
     if !mistakes.is_empty() {
         return Err(broken(mistakes.into_lines()));
     }
-    let Reader {
-        lists,
-        faces,
-        materials,
-        left,
-        lacks_library,
-        ..
-    } = reader;
-    if faces.flat > 0 {
-        let count = faces.flat;
+    if reader.faces.flat > 0 {
+        let count = reader.faces.flat;
         model.note(format!(
             "{count} faces of fewer than three corners are left out"
         ));
     }
-    model.names.shapes = faces.names();
-    let parts = faces.into_parts();
-    let opaque = opaque_instead(&parts, &materials);
-    if let Some(note) = &opaque {
-        model.note(note);
-    }
-    let mut images = Images::new(left);
-    let has_colors = lists.has_colors();
-    for part in parts {
-        let mtl = match &part.material {
-            None => None,
-            Some((name, line, column)) => match materials.get(name) {
-                Some(mtl) => Some(mtl),
-                // A warning about the library says enough.
-                None if folder.is_none() || lacks_library => None,
-                None => {
-                    let known = materials.keys().map(String::as_str);
-                    let help = scan::nearest(name, known);
-                    let text = format!("there is no material `{name}`{help}; it is plain grey");
-                    mistakes.warn(*line, *column, text);
-                    None
-                }
-            },
-        };
-        let looks = match mtl {
-            Some(mtl) => Looks::of(mtl, has_colors, &mut images, &mut model, &mut mistakes),
-            None if has_colors => Looks::of_vertex_colors(),
-            None => Looks::plain(plain_material()),
-        };
-        let alpha = looks.alpha.filter(|_| opaque.is_none());
-        let mesh = lists.mesh(&part);
-        let material = model.materials.len();
-        model.materials.push(looks.material);
-        model.shapes.push(Shape {
-            geometry: Geometry::Mesh(Arc::new(mesh)),
-            material,
-            area_light: looks.emission,
-            media: None,
-            alpha,
-            shadow_alpha: None,
-            reverse_orientation: false,
-            transform_swaps_handedness: false,
-        });
-    }
+    reader.shapes(&mut model, &mut mistakes);
     if !mistakes.is_empty() {
         return Err(broken(mistakes.into_lines()));
     }
     model.warnings = mistakes.take_warnings();
-    model.files.extend(images.paths().cloned());
     model.files.sort();
     model.files.dedup();
     Ok(model)
@@ -253,6 +203,50 @@ impl Reader<'_> {
             }
         }
         true
+    }
+
+    /// Makes a shape of the faces of each material.
+    fn shapes(self, model: &mut Model, mistakes: &mut Mistakes) {
+        let (lists, materials) = (&self.lists, &self.materials);
+        model.names.shapes = self.faces.names();
+        let parts = self.faces.into_parts();
+        let opaque = opaque_instead(&parts, materials);
+        if let Some(note) = &opaque {
+            model.note(note);
+        }
+        let mut images = Images::new(self.left);
+        let has_colors = lists.has_colors();
+        // A warning about the library says enough.
+        let says_missing = self.folder.is_some() && !self.lacks_library;
+        for part in parts {
+            let mtl = part.material.as_ref().and_then(|(name, line, column)| {
+                let mtl = materials.get(name);
+                if mtl.is_none() && says_missing {
+                    let help = scan::nearest(name, materials.keys().map(String::as_str));
+                    let text = format!("there is no material `{name}`{help}; it is plain grey");
+                    mistakes.warn(*line, *column, text);
+                }
+                mtl
+            });
+            let looks = match mtl {
+                Some(mtl) => Looks::of(mtl, has_colors, &mut images, model, mistakes),
+                None if has_colors => Looks::of_vertex_colors(),
+                None => Looks::plain(plain_material()),
+            };
+            let material = model.materials.len();
+            model.materials.push(looks.material);
+            model.shapes.push(Shape {
+                geometry: Geometry::Mesh(Arc::new(lists.mesh(&part))),
+                material,
+                area_light: looks.emission,
+                media: None,
+                alpha: looks.alpha.filter(|_| opaque.is_none()),
+                shadow_alpha: None,
+                reverse_orientation: false,
+                transform_swaps_handedness: false,
+            });
+        }
+        model.files.extend(images.paths().cloned());
     }
 
     /// Reads the libraries that a line names. A name may contain spaces if such a file exists.

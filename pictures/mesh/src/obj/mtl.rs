@@ -1,5 +1,6 @@
 //! Statements of `.mtl` files.
 
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
 use antumbra_scene::{Rgb, Wrap};
@@ -82,62 +83,21 @@ pub(super) fn parse(
             });
             continue;
         }
-        let mut wrong = |column: usize, reason: String| {
-            let text = format!("{reason}; `{word}` is left out");
+        let mut wrong = |column: usize, text: String| {
             mistakes.warn_of_file(path, line_number, column, text);
         };
         let Some(mtl) = all.last_mut() else {
-            wrong(column, "there is no `newmtl` before it".into());
+            let text = format!("there is no `newmtl` before it; `{word}` is left out");
+            wrong(column, text);
             continue;
         };
         let mut statement = Statement {
+            word: &word,
             words: &all_words[1..],
-            column,
+            place: (path, line_number, column),
             wrong: &mut wrong,
         };
-        let map = |statement: &mut Statement| statement.map(path, line_number);
-        match word.as_str() {
-            "Kd" => mtl.kd = statement.color(),
-            "Ks" => mtl.ks = statement.color(),
-            "Ke" => mtl.ke = statement.color(),
-            "Tf" => mtl.tf = statement.color(),
-            "Ns" => mtl.ns = statement.number(),
-            "Ni" => mtl.ni = statement.number(),
-            "d" => {
-                if let Some((_, b"-halo")) = statement.words.first() {
-                    statement.words = &statement.words[1..];
-                    model.note("`d -halo` is taken as `d`");
-                }
-                mtl.d = statement.number();
-                mtl.clear_at = Some(said(text, path, line_number, column));
-            }
-            "Tr" => {
-                mtl.tr = statement.number();
-                let at = || said(text, path, line_number, column);
-                mtl.clear_at.get_or_insert_with(at);
-            }
-            "illum" => mtl.illum = statement.number().map(|kind| kind as u32),
-            "Pr" => mtl.roughness = statement.number(),
-            "Pm" => mtl.metallic = statement.number(),
-            "map_Kd" => mtl.map_kd = map(&mut statement),
-            "map_Ks" => mtl.map_ks = map(&mut statement),
-            "map_Ke" => mtl.map_ke = map(&mut statement),
-            "map_d" | "map_Tr" => {
-                if word == "map_Tr" {
-                    model.note("`map_Tr` is taken as `map_d`");
-                }
-                mtl.map_d = map(&mut statement);
-            }
-            "map_Bump" | "map_bump" | "bump" | "Bump" => mtl.bump = map(&mut statement),
-            "norm" | "map_Kn" => mtl.normal = map(&mut statement),
-            "map_Pr" => mtl.map_roughness = map(&mut statement),
-            "map_Pm" => mtl.map_metallic = map(&mut statement),
-            word if SILENT.contains(&word) => {}
-            word => {
-                let text = format!("`{word}` is unknown or not supported, and is left out");
-                mistakes.warn_of_file(path, line_number, column, text);
-            }
-        }
+        statement.read(text, mtl, model);
     }
     for mtl in &all {
         if let (Some(d), Some(tr), Some(at)) = (mtl.d, mtl.tr, &mtl.clear_at)
@@ -167,22 +127,77 @@ impl Mtl {
     }
 }
 
+/// A statement with the words behind the first one.
 struct Statement<'a> {
+    word: &'a str,
     words: &'a [(usize, &'a [u8])],
-    column: usize,
+    /// File, line and column.
+    place: (&'a Path, usize, usize),
+    /// Warns of a place in the line.
     wrong: &'a mut dyn FnMut(usize, String),
 }
 
 impl Statement<'_> {
+    /// Sets what the statement says of a material. `line` is its whole text.
+    fn read(&mut self, line: &[u8], mtl: &mut Mtl, model: &mut Model) {
+        let (path, number, column) = self.place;
+        match self.word {
+            "Kd" => mtl.kd = self.color(),
+            "Ks" => mtl.ks = self.color(),
+            "Ke" => mtl.ke = self.color(),
+            "Tf" => mtl.tf = self.color(),
+            "Ns" => mtl.ns = self.number(),
+            "Ni" => mtl.ni = self.number(),
+            "d" => {
+                if let Some((_, b"-halo")) = self.words.first() {
+                    self.words = &self.words[1..];
+                    model.note("`d -halo` is taken as `d`");
+                }
+                mtl.d = self.number();
+                mtl.clear_at = Some(said(line, path, number, column));
+            }
+            "Tr" => {
+                mtl.tr = self.number();
+                let at = || said(line, path, number, column);
+                mtl.clear_at.get_or_insert_with(at);
+            }
+            "illum" => mtl.illum = self.number().map(|kind| kind as u32),
+            "Pr" => mtl.roughness = self.number(),
+            "Pm" => mtl.metallic = self.number(),
+            "map_Kd" => mtl.map_kd = self.map(),
+            "map_Ks" => mtl.map_ks = self.map(),
+            "map_Ke" => mtl.map_ke = self.map(),
+            "map_d" => mtl.map_d = self.map(),
+            "map_Tr" => {
+                model.note("`map_Tr` is taken as `map_d`");
+                mtl.map_d = self.map();
+            }
+            "map_Bump" | "map_bump" | "bump" | "Bump" => mtl.bump = self.map(),
+            "norm" | "map_Kn" => mtl.normal = self.map(),
+            "map_Pr" => mtl.map_roughness = self.map(),
+            "map_Pm" => mtl.map_metallic = self.map(),
+            word if SILENT.contains(&word) => {}
+            word => {
+                let text = format!("`{word}` is unknown or not supported, and is left out");
+                (self.wrong)(column, text);
+            }
+        }
+    }
+
+    /// Warns that the statement cannot be read, and why.
+    fn leave_out(&mut self, column: usize, reason: impl Display) {
+        (self.wrong)(column, format!("{reason}; `{}` is left out", self.word));
+    }
+
     fn number(&mut self) -> Option<f32> {
         let Some(&(column, word)) = self.words.first() else {
-            (self.wrong)(self.column, "a number is needed here".into());
+            self.leave_out(self.place.2, "a number is needed here");
             return None;
         };
         let found = number::<f32>(word).filter(|number| number.is_finite());
         if found.is_none() {
             let word = String::from_utf8_lossy(word);
-            (self.wrong)(column, format!("`{word}` is not a finite number"));
+            self.leave_out(column, format!("`{word}` is not a finite number"));
         }
         found
     }
@@ -191,7 +206,7 @@ impl Statement<'_> {
     fn color(&mut self) -> Option<Rgb> {
         if let Some((column, word @ (b"spectral" | b"xyz"))) = self.words.first() {
             let word = String::from_utf8_lossy(word);
-            (self.wrong)(*column, format!("colours as `{word}` are not supported"));
+            self.leave_out(*column, format!("colours as `{word}` are not supported"));
             return None;
         }
         let all = self.words;
@@ -207,12 +222,13 @@ impl Statement<'_> {
     }
 
     /// An image: options, then the rest of the line as its name.
-    fn map(&mut self, library: &Path, line: usize) -> Option<Map> {
+    fn map(&mut self) -> Option<Map> {
+        let (library, line, column) = self.place;
         let mut map = Map {
             path: PathBuf::new(),
             library: library.to_path_buf(),
             line,
-            column: self.column,
+            column,
             name: String::new(),
             scale: Vec2::ONE,
             offset: Vec2::ZERO,
@@ -247,17 +263,15 @@ impl Statement<'_> {
                 (b"-blendu" | b"-blendv" | b"-cc" | b"-imfchan" | b"-type", _) => used = 1,
                 _ => {
                     let option = String::from_utf8_lossy(option);
-                    (self.wrong)(
-                        *column,
-                        format!("option `{option}` is unknown or lacks its value"),
-                    );
+                    let reason = format!("option `{option}` is unknown or lacks its value");
+                    self.leave_out(*column, reason);
                     return None;
                 }
             }
             words = rest.get(used..).unwrap_or_default();
         }
         let Some(&(column, _)) = words.first() else {
-            (self.wrong)(self.column, "the name of an image is needed here".into());
+            self.leave_out(self.place.2, "the name of an image is needed here");
             return None;
         };
         let names: Vec<_> = words
