@@ -1,6 +1,5 @@
 //! Loading: from a name to a scene, by its extension.
 
-use antumbra_scene::material::Matte;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -9,6 +8,7 @@ use antumbra::recipe::Order;
 use antumbra_mesh::{Names, Warning, load_gltf, load_obj, load_stl, plain_material};
 use antumbra_pbrt::{Diagnostic, Times};
 use antumbra_raster::RasterCells;
+use antumbra_scene::material::Matte;
 use antumbra_scene::{Geometry, Material, Param, Scene, Shape, Texture, TriangleMesh, builtin};
 
 use glam::{DVec3, Vec3};

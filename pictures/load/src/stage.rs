@@ -2,11 +2,11 @@
 //!
 //! Directions belong to a stage that looks along -z with y up. [`Up`] turns the stage to the up axis of the mesh.
 
-use antumbra_scene::material::Matte;
 use std::str::FromStr;
 use std::sync::Arc;
 
 use antumbra_mesh::{Model, View};
+use antumbra_scene::material::Matte;
 use antumbra_scene::{
     Camera, Environment, EnvironmentMapping, Film, Geometry, Image, Integrator, Light, Material,
     Param, Rgb, Sampler, SamplerKind, Scene, Shape, TriangleMesh,

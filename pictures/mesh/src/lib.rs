@@ -36,10 +36,10 @@ mod names;
 mod obj;
 mod stl;
 
-use antumbra_scene::material::Matte;
 use std::io;
 use std::path::{Path, PathBuf};
 
+use antumbra_scene::material::Matte;
 use antumbra_scene::{Material, Rgb};
 
 pub use gltf::{load_gltf, parse_gltf};

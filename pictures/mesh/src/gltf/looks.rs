@@ -10,12 +10,12 @@
 //! | emission | an area light with a texture |
 //! | occlusion | none: light is traced |
 
-use antumbra_scene::material::{Glass, Metallic, Mix, NormalMapped};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use antumbra_scene::material::{Glass, Metallic, Mix, NormalMapped};
 use antumbra_scene::{AreaLight, Mapping, Material, Param, Rgb, Texture, Wrap};
 use data_url::DataUrl;
 use glam::Vec2;

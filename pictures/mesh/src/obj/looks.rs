@@ -17,9 +17,9 @@
 //! that `Ks .5` is the coat of an index of refraction of 1.5, and `Ks 1` twice that. Blender reads `Ks` in the same way.
 //! Light that the coat does not reflect reaches the base, so that no energy is gained and little is lost.
 
-use antumbra_scene::material::{Glass, Matte, Metallic, NormalMapped, Substrate};
 use std::sync::Arc;
 
+use antumbra_scene::material::{Glass, Matte, Metallic, NormalMapped, Substrate};
 use antumbra_scene::{
     AreaLight, Image, Mapping, Material, Param, Pixels, Rgb, Texture, TextureFilter,
 };

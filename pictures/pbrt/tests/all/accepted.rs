@@ -1,9 +1,9 @@
 //! Valid files, and the scene of each.
 
-use antumbra_scene::material::{Glass, Hair, Matte, Mirror, Plastic};
 use std::path::Path;
 
 use antumbra_pbrt::{Options, Severity, parse};
+use antumbra_scene::material::{Glass, Hair, Matte, Mirror, Plastic};
 use antumbra_scene::{
     Accelerator, DirectStrategy, Filter, Geometry, Integrator, Light, LightStrategy, Material,
     Pigment, Projection, Rgb, SamplerKind, Shape, TriangleMesh,

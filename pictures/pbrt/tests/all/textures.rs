@@ -1,9 +1,9 @@
 //! Textures, the images they look up, and alpha masks.
 
-use antumbra_scene::material::Matte;
 use std::sync::Arc;
 
 use antumbra_image::{Image as Picture, Window};
+use antumbra_scene::material::Matte;
 use antumbra_scene::{
     ImageTexture, Mapping, Material, Param, Pixels, Rgb, Scene, Texture, TextureFilter, Wrap,
 };

@@ -1,10 +1,10 @@
 //! Queues stay short, however many rays one point sends. The time at which they are traced changes nothing.
 
 use antumbra::recipe::Engine;
-use antumbra_scene::material::Matte;
 use std::sync::Arc;
 
 use antumbra::Isa;
+use antumbra_scene::material::Matte;
 use antumbra_scene::{
     AreaLight, DirectStrategy, Geometry, Integrator as Settings, Light, Material, Scene, Shape,
     Sphere, TriangleMesh,

@@ -1,10 +1,10 @@
 //! Varying materials against constant ones, and bumps against the normals of the surface that they stand for.
 
+use std::sync::Arc;
+
 use antumbra_scene::material::{
     Bumped, Glass, Matte, Metal, Mix, NormalMapped, Plastic, Substrate, Translucent, Uber,
 };
-use std::sync::Arc;
-
 use antumbra_scene::{
     Geometry, Mapping, Material as Scene, Param, Rgb, Shape, Texture, TriangleMesh,
 };

@@ -6,10 +6,10 @@
 //! - mirrors and glass in a uniform world
 //! - which side emits, what is behind the camera, lens and filters in a uniform world
 
-use antumbra_scene::material::{Glass, Mirror, Plastic};
 use std::f64::consts::{FRAC_1_PI, FRAC_1_SQRT_2, PI};
 
 use crate::support::*;
+use antumbra_scene::material::{Glass, Mirror, Plastic};
 use antumbra_scene::{
     DirectStrategy, Filter, Integrator, Light, LightStrategy, Material, Param, Rgb, SamplerKind,
     Scene,

@@ -5,10 +5,10 @@
 //! - with light samples, without, and with both
 //! - strategies of choice between lights
 
-use antumbra_scene::material::{Glass, Plastic};
 use std::sync::Arc;
 
 use crate::support::*;
+use antumbra_scene::material::{Glass, Plastic};
 use antumbra_scene::{
     DirectStrategy, Environment, EnvironmentMapping, Image, Integrator, Light, LightStrategy,
     Material, Pixels, Rgb, Scene,

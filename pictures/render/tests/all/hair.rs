@@ -1,10 +1,10 @@
 //! Hair on curves.
 
-use antumbra_scene::material::Hair;
 use std::sync::Arc;
 
 use crate::support::*;
 use antumbra_render::World;
+use antumbra_scene::material::Hair;
 use antumbra_scene::{
     CurveProfile, Curves, DirectStrategy, Geometry, Integrator, Light, LightStrategy, Material,
     Pigment, Rgb, Scene,

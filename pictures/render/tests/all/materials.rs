@@ -1,11 +1,11 @@
 //! Textured, layered and absent surfaces in whole pictures, against closed forms and each other.
 
-use antumbra_scene::material::{Bumped, Matte, Metal, Mirror, Mix, Substrate, Translucent, Uber};
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
 use crate::support::*;
 use antumbra_render::{Options, World, render};
+use antumbra_scene::material::{Bumped, Matte, Metal, Mirror, Mix, Substrate, Translucent, Uber};
 use antumbra_scene::{
     DirectStrategy, Geometry, Image, ImageTexture, Integrator, LightStrategy, Mapping, Material,
     Param, Pixels, Rgb, Scene, Texture, TextureFilter, TriangleMesh, Wrap,

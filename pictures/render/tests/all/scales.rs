@@ -5,11 +5,11 @@
 //! - furnaces at every scale
 //! - samples that are not finite are counted and leave their pixel alone
 
-use antumbra_scene::material::Mirror;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::support::*;
+use antumbra_scene::material::Mirror;
 use antumbra_scene::{
     Geometry, Instance, Integrator, Light, LightStrategy, Material, Object, Scene, TriangleMesh,
 };

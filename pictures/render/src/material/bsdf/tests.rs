@@ -1,11 +1,11 @@
 //! Every BSDF: sampling agrees with its density, densities integrate to what is drawn, energy is kept.
 
+use std::sync::Arc;
+
 use antumbra_scene::material::{
     CoatedConductor, CoatedDiffuse, Disney, Glass, Matte, Metal, Metallic, Mirror, Mix, Plastic,
     Substrate, ThinDielectric, Translucent, Uber,
 };
-use std::sync::Arc;
-
 use antumbra_scene::{DisneyBody, Material, Param};
 
 use super::*;

@@ -1,11 +1,11 @@
 //! A scene with a little of everything, for tests that hold for any scene.
 
-use antumbra_scene::material::{
-    Bumped, Glass, Matte, Metal, Mirror, Mix, Plastic, Substrate, Translucent, Uber,
-};
 use std::sync::Arc;
 
 use antumbra_render::Options;
+use antumbra_scene::material::{
+    Bumped, Glass, Matte, Metal, Mirror, Mix, Plastic, Substrate, Translucent, Uber,
+};
 use antumbra_scene::{
     Geometry, Light, Mapping, Material, Param, Rgb, Scene, Texture, TriangleMesh,
 };

@@ -2,10 +2,10 @@
 
 pub mod heap;
 
-use antumbra_scene::material::{Glass, Matte};
 use std::sync::Arc;
 
 use antumbra_render::{Options, Rendering, World, render};
+use antumbra_scene::material::{Glass, Matte};
 use antumbra_scene::{
     AreaLight, Camera, Film, Geometry, Integrator, Light, LightStrategy, Material, Param, Rgb,
     Sampler, SamplerKind, Scene, Shape, Sphere, TriangleMesh,
