@@ -117,29 +117,13 @@ impl Map {
                 "metres: wanted a length above 0, or None",
             ));
         }
-        let surface = heights
-            .map(|heights| grid(heights, "heights"))
-            .transpose()?;
-        let steps = match range {
-            Some((low, high)) if !(low < high && (high - low).is_finite()) => {
-                return Err(wrong(Error::Range(low, high)));
-            }
-            Some((low, high)) => Steps::between(low, high, false),
-            None => Steps::around(&values, false),
-        };
-        let relief = match &surface {
-            Some((heights, rows, columns)) => {
-                Some(Surface::new(heights, *rows, *columns, cell * width as f64)?)
-            }
-            None => None,
-        };
-        if let Some(relief) = &relief {
-            let [rows, columns] = [relief.rows, relief.columns];
-            if rows * width != columns * height {
-                let wanted = format!("the proportions of ({height}, {width})");
-                return Err(wrong_shape("heights", &[rows, columns], &wanted));
-            }
-        }
+        let surface = heights.map(|heights| grid(heights, "heights"));
+        let surface = surface.transpose()?;
+        let steps = steps(range, &values)?;
+        let relief = surface.as_ref().map(|(heights, rows, columns)| {
+            Surface::new(heights, (*rows, *columns), (height, width), cell)
+        });
+        let relief = relief.transpose()?;
         let sheet = Sheet {
             values: &values,
             width,
@@ -323,6 +307,17 @@ impl Map {
     }
 }
 
+/// Steps of the colours between the ends that a call gives, or around the values.
+fn steps(range: Option<(f64, f64)>, values: &[f32]) -> PyResult<Steps> {
+    match range {
+        Some((low, high)) if !(low < high && (high - low).is_finite()) => {
+            Err(wrong(Error::Range(low, high)))
+        }
+        Some((low, high)) => Ok(Steps::between(low, high, false)),
+        None => Ok(Steps::around(values, false)),
+    }
+}
+
 fn unwritten(error: antumbra_image::Error) -> PyErr {
     PyOSError::new_err(error.to_string())
 }
@@ -337,9 +332,14 @@ struct Surface<'a> {
 }
 
 impl<'a> Surface<'a> {
-    /// A surface over a width, in the unit of the model. Normals come from central differences.
-    fn new(heights: &'a [f32], rows: usize, columns: usize, width: f64) -> PyResult<Self> {
-        let pixel = width / columns.max(1) as f64;
+    /// A surface under values of a shape, whose cells are so wide in the unit of the model. Normals come from central differences.
+    fn new(
+        heights: &'a [f32],
+        (rows, columns): (usize, usize),
+        (height, width): (usize, usize),
+        cell: f64,
+    ) -> PyResult<Self> {
+        let pixel = cell * width as f64 / columns.max(1) as f64;
         let at = |row: usize, column: usize| heights[row * columns + column];
         // Slope between two neighbours; where one is absent, from the other one to the pixel itself.
         let slope = |[before, here, after]: [f32; 3]| {
@@ -367,9 +367,14 @@ impl<'a> Surface<'a> {
             [-x / length, -y / length, 1.0 / length]
         };
         let count = rows * columns;
+        let normals = memory::collected((0..count).map(normal), count, CELLS)?;
+        if rows * width != columns * height {
+            let wanted = format!("the proportions of ({height}, {width})");
+            return Err(wrong_shape("heights", &[rows, columns], &wanted));
+        }
         Ok(Self {
             heights,
-            normals: memory::collected((0..count).map(normal), count, CELLS)?,
+            normals,
             rows,
             columns,
             pixel,
