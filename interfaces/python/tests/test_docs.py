@@ -14,6 +14,7 @@ import antumbra.trimesh
 import numpy as np
 import pytest
 import reference
+import stubs
 
 DOCS = pathlib.Path(__file__).parents[3] / "docs" / "src" / "python"
 EXAMPLES = sorted((DOCS / "examples").glob("*.py"))
@@ -46,6 +47,10 @@ def test_there_is_a_page_about_every_example():
 
 def test_the_reference_is_what_the_docstrings_say():
     assert (DOCS / "reference.md").read_text() == reference.text(), "run interfaces/python/tests/reference.py"
+
+
+def test_the_stub_is_what_the_signatures_say():
+    assert stubs.STUB.read_text() == stubs.text(), "run interfaces/python/tests/stubs.py"
 
 
 MODULES = [am, antumbra.open3d, antumbra.trimesh, antumbra.embreex, antumbra.embreex.rtcore, antumbra.embreex.rtcore_scene, antumbra.embreex.mesh_construction]
