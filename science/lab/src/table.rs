@@ -13,7 +13,24 @@ pub struct Table {
     pub rows: Vec<Vec<String>>,
 }
 
+/// Heading of a column, and the cell of a row.
+pub(crate) type Column<'a, T> = (&'static str, &'a dyn Fn(&T) -> String);
+
 impl Table {
+    /// A table of rows by columns.
+    pub(crate) fn of<'r, T: 'r>(
+        caption: String,
+        rows: impl IntoIterator<Item = &'r T>,
+        columns: &[Column<T>],
+    ) -> Self {
+        let cells = |row: &T| columns.iter().map(|(_, cell)| cell(row)).collect();
+        Self {
+            caption,
+            header: columns.iter().map(|(name, _)| *name).collect(),
+            rows: rows.into_iter().map(cells).collect(),
+        }
+    }
+
     /// The table as Markdown, without its caption. Figures are aligned to the right.
     pub fn markdown(&self) -> String {
         let mut table = comfy_table::Table::new();

@@ -214,19 +214,10 @@ impl Results {
 /// Fails if an answer of ours was wrong.
 fn verdict(document: &Document) -> Result<(), Error> {
     let mut wrong = Vec::new();
-    for check in document
-        .checks
-        .iter()
-        .filter(|check| check.disagreements > 0)
-    {
-        let Check {
-            scene,
-            rays,
-            ray_count,
-            disagreements,
-        } = check;
+    for check in document.checks.iter().filter(|one| one.disagreements > 0) {
         wrong.push(format!(
-            "{scene}: {disagreements} of {ray_count} {rays} rays against brute force"
+            "{}: {} of {} {} rays against brute force",
+            check.scene, check.disagreements, check.ray_count, check.rays
         ));
     }
     let rows = document.rows.iter().filter(|row| row.engine == "antumbra");
@@ -246,18 +237,9 @@ fn verdict(document: &Document) -> Result<(), Error> {
     }
     let kinds = document.kinds.iter().filter(|row| row.engine == "antumbra");
     for row in kinds.filter(|row| row.disagreements > 0) {
-        let KindRow {
-            scene,
-            disagreements,
-            count,
-            kind,
-            api,
-            query,
-            level,
-            ..
-        } = row;
         wrong.push(format!(
-            "{scene}: {disagreements} of {count}, {kind}, {api} {query}, {level}"
+            "{}: {} of {}, {}, {} {}, {}",
+            row.scene, row.disagreements, row.count, row.kind, row.api, row.query, row.level
         ));
     }
     if wrong.is_empty() {

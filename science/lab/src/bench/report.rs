@@ -11,7 +11,7 @@ use super::model::Size;
 use super::record::{BuildRow, Document, Group, KindRow, Row, distinct, groups};
 use crate::Error;
 use crate::output::write_json;
-use crate::table::{Table, count, number};
+use crate::table::{Column, Table, count, number};
 
 const RATES: [&str; 11] = [
     "engine",
@@ -26,22 +26,6 @@ const RATES: [&str; 11] = [
     "shadow nodes",
     "shadow prims",
 ];
-const BUILDS: [&str; 9] = [
-    "scene", "engine", "builder", "level", "threads", "seconds", "best", "Mtri/s", "MB",
-];
-
-const KINDS: [&str; 9] = [
-    "kind",
-    "query",
-    "engine",
-    "api",
-    "level",
-    "million/s",
-    "ratio",
-    "to triangles",
-    "differ",
-];
-
 /// Meaning of the words in the headings of the tables.
 pub const LEGEND: &str = "\
 Mray/s: millions of rays per second, by the median time; ratio: median speed relative to Embree's single-ray call of the same \
@@ -104,40 +88,51 @@ pub fn tables(rows: &[Row]) -> Vec<Table> {
 
 /// The table of build times.
 pub fn builds(builds: &[BuildRow]) -> Table {
-    Table {
-        caption: "Building".to_owned(),
-        header: BUILDS.to_vec(),
-        rows: build_cells(builds),
-    }
+    let megabytes = |row: &BuildRow| {
+        let buffers = match row.buffer_bytes {
+            0 => String::new(),
+            bytes => format!(" + {:.1}", bytes as f64 / 1e6),
+        };
+        format!("{:.1}{buffers}", row.bytes as f64 / 1e6)
+    };
+    let rate = |row: &BuildRow| row.size.unique_triangles as f64 / row.seconds / 1e6;
+    let columns: &[Column<BuildRow>] = &[
+        ("scene", &|row| row.scene.clone()),
+        ("engine", &|row| row.engine.to_owned()),
+        ("builder", &|row| row.builder.to_owned()),
+        ("level", &|row| row.level.clone()),
+        ("threads", &|row| row.threads.to_string()),
+        ("seconds", &|row| number(Some(row.seconds), 3)),
+        ("best", &|row| number(Some(row.best_seconds), 3)),
+        ("Mtri/s", &|row| number(Some(rate(row)), 2)),
+        ("MB", &megabytes),
+    ];
+    Table::of("Building".to_owned(), builds, columns)
 }
 
 /// A table of things beside plain triangles for every scene.
 pub fn kinds(rows: &[KindRow]) -> Vec<Table> {
-    let table = |scene: &String| Table {
-        caption: format!("{scene}: beside plain triangles, 1 thread"),
-        header: KINDS.to_vec(),
-        rows: (rows.iter().filter(|row| row.scene == *scene))
-            .map(kind_cells)
-            .collect(),
+    let columns: &[Column<KindRow>] = &[
+        ("kind", &|row| row.kind.to_owned()),
+        ("query", &|row| row.query.to_owned()),
+        ("engine", &|row| row.engine.to_owned()),
+        ("api", &|row| row.api.to_owned()),
+        ("level", &|row| row.level.clone()),
+        ("million/s", &|row| number(Some(row.millions_per_s), 3)),
+        ("ratio", &|row| number(row.ratio_to_embree, 2)),
+        ("to triangles", &|row| number(row.ratio_to_triangles, 2)),
+        ("differ", &|row| row.disagreements.to_string()),
+    ];
+    let table = |scene: &String| {
+        let caption = format!("{scene}: beside plain triangles, 1 thread");
+        Table::of(
+            caption,
+            rows.iter().filter(|row| row.scene == *scene),
+            columns,
+        )
     };
-    distinct(rows.iter().map(|row| &row.scene))
-        .into_iter()
-        .map(table)
-        .collect()
-}
-
-fn kind_cells(row: &KindRow) -> Vec<String> {
-    vec![
-        row.kind.to_owned(),
-        row.query.to_owned(),
-        row.engine.to_owned(),
-        row.api.to_owned(),
-        row.level.clone(),
-        number(Some(row.millions_per_s), 3),
-        number(row.ratio_to_embree, 2),
-        number(row.ratio_to_triangles, 2),
-        row.disagreements.to_string(),
-    ]
+    let scenes = distinct(rows.iter().map(|row| &row.scene));
+    scenes.into_iter().map(table).collect()
 }
 
 fn caption(group: &Group) -> String {
@@ -197,28 +192,4 @@ fn cells(group: &Group) -> (Vec<&'static str>, Vec<Vec<String>>) {
         lines.push(cells);
     }
     (header, lines)
-}
-
-fn build_cells(builds: &[BuildRow]) -> Vec<Vec<String>> {
-    let line = |row: &BuildRow| {
-        let buffers = match row.buffer_bytes {
-            0 => String::new(),
-            bytes => format!(" + {:.1}", bytes as f64 / 1e6),
-        };
-        vec![
-            row.scene.clone(),
-            row.engine.to_owned(),
-            row.builder.to_owned(),
-            row.level.clone(),
-            row.threads.to_string(),
-            number(Some(row.seconds), 3),
-            number(Some(row.best_seconds), 3),
-            number(
-                Some(row.size.unique_triangles as f64 / row.seconds / 1e6),
-                2,
-            ),
-            format!("{:.1}{buffers}", row.bytes as f64 / 1e6),
-        ]
-    };
-    builds.iter().map(line).collect()
 }

@@ -160,6 +160,18 @@ fn faint() -> ShapeStyle {
 }
 
 impl Dots {
+    /// Node tests per ray.
+    pub fn tests(lines: Vec<String>, series: Vec<String>, dots: Vec<Dot>) -> Self {
+        Self {
+            lines,
+            series,
+            dots,
+            axis: "node tests per ray".into(),
+            from_zero: false,
+            mark: None,
+        }
+    }
+
     /// Draws them.
     pub fn draw(&self) -> Result<String, Error> {
         let legend = legend_height(&self.series);

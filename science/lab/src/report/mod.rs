@@ -24,7 +24,7 @@ use antumbra_image::atomic_write;
 
 use crate::output::write_json;
 use crate::study::{By, Kind, Part, Plan, Results, Row};
-use crate::table::{Table, count, number};
+use crate::table::{Column, Table, count, number};
 use crate::{Error, Machine};
 
 /// Columns of N_b and N_t, before and after sorting.
@@ -35,10 +35,6 @@ const TESTS: [&str; 6] = [
     "N_t before",
     "N_t after",
     "N_t gain",
-];
-
-const BEST: [&str; 9] = [
-    "tree", "collapse", "order", "speed", "rounds", "cost", "N_b", "N_t", "occluded",
 ];
 
 const LEGEND: &str = "\
@@ -168,32 +164,38 @@ fn of_orders(rows: &[&Row]) -> Option<Table> {
         count(first.shadow_rays.unwrap_or(0)),
         100.0 * first.shadow_share.unwrap_or(0.0),
     );
-    let times = [
-        "N_b unsorted",
-        "N_t unsorted",
-        "log s",
-        "sort ms",
-        "shadow s",
-        "composed s",
-        "spread",
-        "vs simple",
-        "top N_b after",
+    let reference = reference.copied();
+    let gain = |row: &Row, figure: fn(&Row) -> Option<f64>| {
+        let pair = reference.and_then(figure).zip(figure(row));
+        number(pair.map(|(simple, own)| simple / own), 2)
+    };
+    let columns: &[Column<Row>] = &[
+        ("order", &|row| row.order.clone()),
+        ("C_p", &|row| {
+            number(learned(row, f64::from(row.prim_cost)), 2)
+        }),
+        (TESTS[0], &|row| number(row.node_tests_before, 2)),
+        (TESTS[1], &|row| number(row.node_tests_after, 2)),
+        (TESTS[2], &|row| gain(row, |row| row.node_tests_after)),
+        (TESTS[3], &|row| number(row.prim_tests_before, 2)),
+        (TESTS[4], &|row| number(row.prim_tests_after, 2)),
+        (TESTS[5], &|row| gain(row, |row| row.prim_tests_after)),
+        ("N_b unsorted", &|row| number(row.node_tests_unsorted, 2)),
+        ("N_t unsorted", &|row| number(row.prim_tests_unsorted, 2)),
+        ("log s", &|row| number(learned(row, row.log_seconds), 3)),
+        ("sort ms", &|row| {
+            number(learned(row, 1e3 * row.sort_seconds), 1)
+        }),
+        ("shadow s", &|row| {
+            number(row.busy_seconds.map(|busy| busy.shadow), 2)
+        }),
+        ("composed s", &|row| number(row.render_seconds, 2)),
+        ("spread", &|row| number(row.spread(), 2)),
+        ("vs simple", &|row| gain(row, |row| row.render_seconds)),
+        ("top N_b after", &|row| number(row.top_node_tests_after, 2)),
     ];
-    let mut header = [&["order", "C_p"][..], &TESTS, &times].concat();
-    if first.top_node_tests_after.is_none() {
-        header.pop();
-    }
-    Some(Table {
-        caption,
-        rows: (rows.iter())
-            .map(|row| {
-                let mut cells = line(row, reference.copied());
-                cells.truncate(header.len());
-                cells
-            })
-            .collect(),
-        header,
-    })
+    let shown = columns.len() - usize::from(first.top_node_tests_after.is_none());
+    Some(Table::of(caption, rows.iter().copied(), &columns[..shown]))
 }
 
 /// Figures of the paper for the scene, or for the scene that ours replaces.
@@ -232,86 +234,63 @@ fn of_the_paper(rows: &[&Row]) -> Option<Table> {
 
 /// Other trees and collapses by one order, if any was rendered.
 fn of_trees(rows: &[&Row]) -> Option<Table> {
-    const TREES: [&str; 14] = [
-        "tree and collapse",
-        "N_b before",
-        "N_b after",
-        "N_t before",
-        "N_t after",
-        "N_b unsorted",
-        "N_t unsorted",
-        "log s",
-        "sort ms",
-        "remake s",
-        "shadow s",
-        "composed s",
-        "spread",
-        "build s",
-    ];
     let first = rows.first()?;
-    let cells = rows.iter().map(|row| {
-        vec![
-            format!("{} {}", row.tree, row.collapse),
-            number(row.node_tests_before, 3),
-            number(row.node_tests_after, 3),
-            number(row.prim_tests_before, 3),
-            number(row.prim_tests_after, 3),
-            number(row.node_tests_unsorted, 3),
-            number(row.prim_tests_unsorted, 3),
-            number(learned(row, row.log_seconds), 3),
-            number(learned(row, 1e3 * row.sort_seconds), 1),
-            number(row.remake_seconds, 3),
-            number(row.busy_seconds.map(|busy| busy.shadow), 2),
-            number(row.render_seconds, 2),
-            number(row.spread(), 2),
-            number(Some(row.build_seconds), 3),
-        ]
-    });
-    Some(Table {
-        caption: format!(
-            "{}: width {}, order {}",
-            first.scene, first.width, first.order
-        ),
-        header: TREES.to_vec(),
-        rows: cells.collect(),
-    })
+    let columns: &[Column<Row>] = &[
+        ("tree and collapse", &|row| {
+            format!("{} {}", row.tree, row.collapse)
+        }),
+        ("N_b before", &|row| number(row.node_tests_before, 3)),
+        ("N_b after", &|row| number(row.node_tests_after, 3)),
+        ("N_t before", &|row| number(row.prim_tests_before, 3)),
+        ("N_t after", &|row| number(row.prim_tests_after, 3)),
+        ("N_b unsorted", &|row| number(row.node_tests_unsorted, 3)),
+        ("N_t unsorted", &|row| number(row.prim_tests_unsorted, 3)),
+        ("log s", &|row| number(learned(row, row.log_seconds), 3)),
+        ("sort ms", &|row| {
+            number(learned(row, 1e3 * row.sort_seconds), 1)
+        }),
+        ("remake s", &|row| number(row.remake_seconds, 3)),
+        ("shadow s", &|row| {
+            number(row.busy_seconds.map(|busy| busy.shadow), 2)
+        }),
+        ("composed s", &|row| number(row.render_seconds, 2)),
+        ("spread", &|row| number(row.spread(), 2)),
+        ("build s", &|row| number(Some(row.build_seconds), 3)),
+    ];
+    let Row {
+        scene,
+        width,
+        order,
+        ..
+    } = first;
+    let caption = format!("{scene}: width {width}, order {order}");
+    Some(Table::of(caption, rows.iter().copied(), columns))
 }
 
 /// Whole pictures that were rendered apart, if any were.
 fn of_measured(rows: &[&Row]) -> Option<Table> {
-    const MEASURED: [&str; 6] = [
-        "tree",
-        "collapse",
-        "order",
-        "measured s",
-        "fastest to slowest",
-        "composed s",
-    ];
-    let measured: Vec<&&Row> = (rows.iter())
+    let measured: Vec<&Row> = (rows.iter())
         .filter(|row| row.measured_seconds.is_some())
+        .copied()
         .collect();
     let first = measured.first()?;
-    let cells = measured.iter().map(|row| {
+    let caption = format!(
+        "{}: width {}, whole pictures rendered apart, median of {}",
+        first.scene, first.width, first.measured_renderings
+    );
+    let range = |row: &Row| {
         let range = row.measured_seconds_range;
-        vec![
-            row.tree.clone(),
-            row.collapse.clone(),
-            row.order.clone(),
-            number(row.measured_seconds, 2),
-            range.map_or_else(String::new, |[least, most]| {
-                format!("{least:.2} to {most:.2}")
-            }),
-            number(row.render_seconds, 2),
-        ]
-    });
-    Some(Table {
-        caption: format!(
-            "{}: width {}, whole pictures rendered apart, median of {}",
-            first.scene, first.width, first.measured_renderings
-        ),
-        header: MEASURED.to_vec(),
-        rows: cells.collect(),
-    })
+        range.map_or_else(String::new, |range| replays::range(Some(range)))
+    };
+    let columns: &[Column<Row>] = &[
+        ("tree", &|row| row.tree.clone()),
+        ("collapse", &|row| row.collapse.clone()),
+        ("order", &|row| row.order.clone()),
+        ("measured s", &|row| number(row.measured_seconds, 2)),
+        ("fastest to slowest", &range),
+        ("composed s", &|row| number(row.render_seconds, 2)),
+    ];
+    Some(Table::of(caption, measured, columns))
 }
 
 /// The best of many combinations.
@@ -323,58 +302,29 @@ fn of_best(plan: &Plan, mut rows: Vec<&Row>) -> Table {
         count(rows[0].test_rays),
         rows.len()
     );
-    let cost = |row: &Row| row.cost(&plan.costs);
+    sort_by_speed(&mut rows, MOST_BEST);
+    let columns: &[Column<Row>] = &[
+        ("tree", &|row| row.tree.clone()),
+        ("collapse", &|row| row.collapse.clone()),
+        ("order", &|row| format!("{} {}", row.order, row.width)),
+        ("speed", &|row| number(row.speed, 2)),
+        ("rounds", &|row| replays::range(row.speed_range)),
+        ("cost", &|row| number(row.cost(&plan.costs), 3)),
+        ("N_b", &|row| number(row.node_tests_after, 3)),
+        ("N_t", &|row| number(row.prim_tests_after, 3)),
+        ("occluded", &|row| number(row.node_tests_occluded, 3)),
+    ];
+    Table::of(caption, rows, columns)
+}
+
+/// The fastest of some rows, the fastest first.
+fn sort_by_speed(rows: &mut Vec<&Row>, most: usize) {
     let rank = |row: &Row| row.speed.unwrap_or(0.0);
     rows.sort_by(|a, b| rank(b).total_cmp(&rank(a)));
-    rows.truncate(MOST_BEST);
-    let cells = rows.iter().map(|row| {
-        vec![
-            row.tree.clone(),
-            row.collapse.clone(),
-            format!("{} {}", row.order, row.width),
-            number(row.speed, 2),
-            replays::range(row.speed_range),
-            number(cost(row), 3),
-            number(row.node_tests_after, 3),
-            number(row.prim_tests_after, 3),
-            number(row.node_tests_occluded, 3),
-        ]
-    });
-    Table {
-        caption,
-        header: BEST.to_vec(),
-        rows: cells.collect(),
-    }
+    rows.truncate(most);
 }
 
 /// A figure of learning; `None` where nothing was learned.
 fn learned(row: &Row, value: f64) -> Option<f64> {
     (row.log_rays > 0).then_some(value)
-}
-
-/// The figures of a rendering, beside the unsorted one.
-fn line(row: &Row, simple: Option<&Row>) -> Vec<String> {
-    let gain = |figure: fn(&Row) -> Option<f64>| {
-        let pair = simple.and_then(figure).zip(figure(row));
-        number(pair.map(|(simple, own)| simple / own), 2)
-    };
-    vec![
-        row.order.clone(),
-        number(learned(row, f64::from(row.prim_cost)), 2),
-        number(row.node_tests_before, 2),
-        number(row.node_tests_after, 2),
-        gain(|row| row.node_tests_after),
-        number(row.prim_tests_before, 2),
-        number(row.prim_tests_after, 2),
-        gain(|row| row.prim_tests_after),
-        number(row.node_tests_unsorted, 2),
-        number(row.prim_tests_unsorted, 2),
-        number(learned(row, row.log_seconds), 3),
-        number(learned(row, 1e3 * row.sort_seconds), 1),
-        number(row.busy_seconds.map(|busy| busy.shadow), 2),
-        number(row.render_seconds, 2),
-        number(row.spread(), 2),
-        gain(|row| row.render_seconds),
-        number(row.top_node_tests_after, 2),
-    ]
 }

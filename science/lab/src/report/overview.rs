@@ -48,16 +48,8 @@ fn orders_block(plan: &Plan, summary: &Summary) -> Option<Block> {
     let mut lines = Vec::new();
     for kind in Kind::ALL {
         for &width in &plan.widths {
-            let gain = |order: &Order| {
-                let combination = Combination {
-                    width,
-                    tree,
-                    collapse,
-                    order: *order,
-                    prim_cost: None,
-                };
-                summary.gain(kind, &combination)
-            };
+            let gain =
+                |order: &Order| summary.gain(kind, &Combination::new(width, plan.base(), *order));
             let gains: Vec<Option<f64>> = plan.orders.iter().map(gain).collect();
             if gains.iter().any(Option::is_some) {
                 let name = format!("{}, {width} wide", words(kind));
@@ -83,16 +75,7 @@ fn trees_block(plan: &Plan, summary: &Summary, kind: Kind) -> Option<Block> {
     for &width in &plan.widths {
         for &tree in &plan.trees {
             let gain = |collapse: &Collapse| {
-                summary.gain(
-                    kind,
-                    &Combination {
-                        width,
-                        tree,
-                        collapse: *collapse,
-                        order,
-                        prim_cost: None,
-                    },
-                )
+                summary.gain(kind, &Combination::new(width, (tree, *collapse), order))
             };
             let gains: Vec<Option<f64>> = plan.collapses.iter().map(gain).collect();
             if gains.iter().any(Option::is_some) {

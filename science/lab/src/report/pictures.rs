@@ -7,6 +7,7 @@ use antumbra_image::heatmap::{self, Range};
 use antumbra_image::{Image, Rgb8Image};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use serde::Serialize;
 
 use crate::Error;
 use crate::study::{Combination, Files, Plan, Subject, exr, png};
@@ -25,6 +26,7 @@ pub struct Maps {
 }
 
 /// A picture as the page has it.
+#[derive(Serialize)]
 pub struct Embedded {
     /// Picture as a `data:` address.
     pub address: String,
@@ -33,6 +35,7 @@ pub struct Embedded {
 }
 
 /// Two maps and their difference for the page.
+#[derive(Serialize)]
 pub struct Comparison {
     pub picture: Embedded,
     pub before: Embedded,
@@ -40,9 +43,10 @@ pub struct Comparison {
     pub difference: Embedded,
     pub scale: Embedded,
     pub difference_scale: Embedded,
-    pub hottest: f32,
+    /// Tests that have the hottest colour.
+    pub hottest: String,
     /// The difference that has the strongest colour.
-    pub strongest: f32,
+    pub strongest: String,
 }
 
 impl Maps {
@@ -138,8 +142,8 @@ impl Maps {
             difference: embed(&difference)?,
             scale: embed(&heatmap::render(&ramp, STEPS, 1, &options)?)?,
             difference_scale: embed(&Rgb8Image::new(STEPS, 1, ends.collect())?)?,
-            hottest: max,
-            strongest,
+            hottest: format!("{max:.0}"),
+            strongest: format!("{strongest:.0}"),
         }))
     }
 }

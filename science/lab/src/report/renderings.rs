@@ -8,40 +8,18 @@ use serde::Serialize;
 use super::blocks::{Block, Cell, Line, Measured, marked_line, plain_line};
 use super::learned;
 use super::paper::{self, Figures};
-use super::pictures::{Comparison, Embedded, Maps};
+use super::pictures::{Comparison, Maps};
 use crate::Error;
 use crate::study::{By, Combination, Files, Plan, Row, Subject};
 use crate::table::number;
 
-#[derive(Serialize)]
-pub struct Picture {
-    pub address: String,
-    pub width: usize,
-    pub height: usize,
-}
-
-impl From<Embedded> for Picture {
-    fn from(from: Embedded) -> Self {
-        Self {
-            address: from.address,
-            width: from.width,
-            height: from.height,
-        }
-    }
-}
-
+/// Two heat maps to wipe between.
 #[derive(Serialize)]
 pub struct Wipe {
-    pub picture: Picture,
-    pub before: Picture,
-    pub after: Picture,
-    pub difference: Picture,
-    pub scale: Picture,
-    pub difference_scale: Picture,
-    pub before_name: String,
-    pub after_name: String,
-    pub hottest: String,
-    pub strongest: String,
+    #[serde(flatten)]
+    maps: Comparison,
+    before_name: String,
+    after_name: String,
 }
 
 /// The heat maps of the first order and of the cheapest, on the base tree.
@@ -87,19 +65,9 @@ pub fn wipe(
         return Ok(None);
     };
     let name = format!("{}-difference", Files::new(plan, subject, after).tests);
-    let Some(found) = maps.compare([before, after], folder, &name)? else {
+    let Some(maps) = maps.compare([before, after], folder, &name)? else {
         return Ok(None);
     };
-    let Comparison {
-        picture,
-        before: before_map,
-        after: after_map,
-        difference,
-        scale,
-        difference_scale,
-        hottest,
-        strongest,
-    } = found;
     let name = |c: &Combination| {
         let tree = if (c.tree, c.collapse) == plan.base() {
             String::new()
@@ -110,16 +78,9 @@ pub fn wipe(
         format!("{}{tree}, {} wide: {tests} tests per ray", c.order, c.width)
     };
     Ok(Some(Wipe {
-        picture: picture.into(),
-        before: before_map.into(),
-        after: after_map.into(),
-        difference: difference.into(),
-        scale: scale.into(),
-        difference_scale: difference_scale.into(),
+        maps,
         before_name: name(before),
         after_name: name(after),
-        hottest: format!("{hottest:.0}"),
-        strongest: format!("{strongest:.0}"),
     }))
 }
 
@@ -132,12 +93,6 @@ pub fn order_name(plan: &Plan, row: &Row) -> String {
     }
 }
 
-/// Cells of text.
-fn plain(rows: &[&Row], text: impl Fn(&Row) -> Option<String>) -> Vec<Cell> {
-    let text = |row: &&Row| text(row).unwrap_or_else(|| "-".to_owned());
-    rows.iter().map(text).map(Cell::plain).collect()
-}
-
 /// The layout of the paper's Tables 2 and 3: techniques beside each other, figures below each other.
 pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) -> Option<Block> {
     let (tree, collapse) = plan.base();
@@ -148,6 +103,45 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
         .copied()
         .collect();
     let first = own.first()?;
+    let mut lines = own_figures(&own, first);
+    let theirs = paper::counterpart(&first.scene);
+    let mut text = "N_b: node tests, N_t: primitive tests, means per shadow ray. Before: over the training rays while they are logged, as in the paper. After: over the held-out rays, which are the same for every order. Unsorted: over the held-out rays, before the children are ordered. Sorting: the child order only. Composed: own queries and learning, with the shading and the film that all trees share, without building the first tree. Measured: rendered apart. Marked: the best of a row, and what its spread does not tell from it.".to_owned();
+    if let Some(theirs) = theirs {
+        let found: Vec<Option<&Figures>> = (own.iter())
+            .map(|row| {
+                let mut paper = paper.iter();
+                paper.find(|f| f.is_of(theirs.name, width, &row.order))
+            })
+            .collect();
+        if found.iter().any(Option::is_some) {
+            text.push_str(if theirs.same {
+                " Below: the same scene in the paper (Core i7-4850HQ, its own renderer and trees)."
+            } else {
+                " Below: the scene of the paper that this one stands in for, which is not public."
+            });
+            if let Some(note) = paper::differences(&first.scene) {
+                text.push_str(&format!(" {note}"));
+                if !first.tree.starts_with("pbrt") {
+                    text.push_str(" Leaves hold up to 8 primitives here and 4 there, so primitive tests are more and node tests fewer; the builder pbrt has the leaves of the paper.");
+                }
+            }
+            lines.extend(quoted(theirs.name, &found));
+        }
+    }
+    Some(
+        Block::table(
+            format!("Renderings, {width} wide, tree {tree}, collapse {collapse}"),
+            text,
+            own.iter().map(|row| order_name(plan, row)),
+            lines,
+        )
+        .wide(),
+    )
+}
+
+/// Lines of our own figures.
+fn own_figures(own: &[&Row], first: &Row) -> Vec<Line> {
+    type Figure = fn(&Row) -> Option<f64>;
     let plain_of = |name: &str, decimals, value: &dyn Fn(&Row) -> Option<f64>| {
         let values: Vec<Option<f64>> = own.iter().map(|row| value(row)).collect();
         plain_line(name.to_owned(), &values, decimals)
@@ -156,29 +150,31 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
         let values: Vec<Option<Measured>> = own.iter().map(|row| value(row)).collect();
         marked_line(name.to_owned(), &values, 2, false)
     };
-    let mut lines = vec![
-        plain_of("N_b before", 2, &|row| row.node_tests_before),
-        plain_of("N_t before", 2, &|row| row.prim_tests_before),
-        marked("N_b after", &|row| {
-            row.node_tests_after.map(Measured::exact)
+    let counts: [(&str, bool, Figure); 9] = [
+        ("N_b before", false, |row| row.node_tests_before),
+        ("N_t before", false, |row| row.prim_tests_before),
+        ("N_b after", true, |row| row.node_tests_after),
+        ("N_t after", true, |row| row.prim_tests_after),
+        ("N_b unsorted", false, |row| row.node_tests_unsorted),
+        ("N_t unsorted", false, |row| row.prim_tests_unsorted),
+        ("top level: N_b before", false, |row| {
+            row.top_node_tests_before
         }),
-        marked("N_t after", &|row| {
-            row.prim_tests_after.map(Measured::exact)
+        ("top level: N_b after", true, |row| row.top_node_tests_after),
+        ("top level: N_b unsorted", false, |row| {
+            row.top_node_tests_unsorted
         }),
-        plain_of("N_b unsorted", 2, &|row| row.node_tests_unsorted),
-        plain_of("N_t unsorted", 2, &|row| row.prim_tests_unsorted),
     ];
-    if first.top_node_tests_after.is_some() {
-        lines.extend([
-            plain_of("top level: N_b before", 2, &|row| row.top_node_tests_before),
-            marked("top level: N_b after", &|row| {
-                row.top_node_tests_after.map(Measured::exact)
-            }),
-            plain_of("top level: N_b unsorted", 2, &|row| {
-                row.top_node_tests_unsorted
-            }),
-        ]);
-    }
+    let levels = if first.top_node_tests_after.is_some() {
+        9
+    } else {
+        6
+    };
+    let count = |&(name, is_marked, figure): &(&str, bool, Figure)| match is_marked {
+        true => marked(name, &|row| figure(row).map(Measured::exact)),
+        false => plain_of(name, 2, &figure),
+    };
+    let mut lines: Vec<Line> = counts[..levels].iter().map(count).collect();
     lines.extend([
         plain_of("logging, s", 2, &|row| learned(row, row.log_seconds)),
         plain_of("sorting, ms", 1, &|row| {
@@ -192,20 +188,16 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
         value.map(|value| Measured { value, range })
     };
     lines.push(marked("whole picture, composed, s", &|row| {
-        timed(
-            row.render_seconds,
-            row.render_seconds_range,
-            row.timed_renderings,
-        )
+        let (value, range) = (row.render_seconds, row.render_seconds_range);
+        timed(value, range, row.timed_renderings)
     }));
     if first.timed_renderings > 1 {
-        let cells = plain(&own, |row| {
-            row.spread().map(|spread| match spread {
-                // A figure that cannot be trusted is not printed like one that can.
-                spread if spread > 1.1 => format!("{spread:.2}, unsteady"),
-                spread => format!("{spread:.2}"),
-            })
+        let cells = own.iter().map(|row| match row.spread() {
+            // A figure that cannot be trusted is not printed like one that can.
+            Some(spread) if spread > 1.1 => format!("{spread:.2}, unsteady"),
+            spread => number(spread, 2),
         });
+        let cells = cells.map(Cell::plain).collect();
         lines.push(Line::new("most / least of the rounds", cells));
     }
     if own.iter().any(|row| row.measured_seconds.is_some()) {
@@ -216,55 +208,26 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
         let spread = |row: &Row| row.measured_seconds_range.map(|[least, most]| most / least);
         lines.push(plain_of("slowest / fastest measured", 2, &spread));
     }
-    let theirs = paper::counterpart(&first.scene);
-    let mut text = "N_b: node tests, N_t: primitive tests, means per shadow ray. Before: over the training rays while they are logged, as in the paper. After: over the held-out rays, which are the same for every order. Unsorted: over the held-out rays, before the children are ordered. Sorting: the child order only. Composed: own queries and learning, with the shading and the film that all trees share, without building the first tree. Measured: rendered apart. Marked: the best of a row, and what its spread does not tell from it.".to_owned();
-    if let Some(theirs) = theirs {
-        let found: Vec<Option<&Figures>> = own
-            .iter()
-            .map(|row| {
-                paper
-                    .iter()
-                    .find(|f| f.is_of(theirs.name, width, &row.order))
-            })
-            .collect();
-        if found.iter().any(Option::is_some) {
-            text.push_str(if theirs.same {
-                " Below: the same scene in the paper (Core i7-4850HQ, its own renderer and trees)."
-            } else {
-                " Below: the scene of the paper that this one stands in for, which is not public."
-            });
-            let quote = |name: &str, decimals, value: &dyn Fn(&Figures) -> Option<f64>| Line {
-                quoted: true,
-                ..plain_line(
-                    format!("{}: {name}", theirs.name),
-                    &found.iter().map(|f| f.and_then(value)).collect::<Vec<_>>(),
-                    decimals,
-                )
-            };
-            if let Some(note) = paper::differences(&first.scene) {
-                text.push_str(&format!(" {note}"));
-                if !first.tree.starts_with("pbrt") {
-                    text.push_str(" Leaves hold up to 8 primitives here and 4 there, so primitive tests are more and node tests fewer; the builder pbrt has the leaves of the paper.");
-                }
-            }
-            lines.extend([
-                quote("N_b before", 2, &|f| f.n_b_before()),
-                quote("N_t before", 2, &|f| f.n_t_before()),
-                quote("N_b after", 2, &|f| Some(f.n_b_after())),
-                quote("N_t after", 2, &|f| Some(f.n_t_after())),
-                quote("logging, s", 1, &|f| f.logging_s),
-                quote("sorting, ms", 0, &|f| f.sorting_ms),
-                quote("rendering, s", 0, &|f| Some(f.total_render_s)),
-            ]);
+    lines
+}
+
+/// Lines of the paper about a scene, technique by technique as far as it has them.
+fn quoted(scene: &str, found: &[Option<&Figures>]) -> impl Iterator<Item = Line> {
+    type Figure = fn(&Figures) -> Option<f64>;
+    let figures: [(&str, usize, Figure); 7] = [
+        ("N_b before", 2, Figures::n_b_before),
+        ("N_t before", 2, Figures::n_t_before),
+        ("N_b after", 2, |f| Some(f.n_b_after())),
+        ("N_t after", 2, |f| Some(f.n_t_after())),
+        ("logging, s", 1, |f| f.logging_s),
+        ("sorting, ms", 0, |f| f.sorting_ms),
+        ("rendering, s", 0, |f| Some(f.total_render_s)),
+    ];
+    figures.into_iter().map(move |(name, decimals, value)| {
+        let values: Vec<Option<f64>> = found.iter().map(|f| f.and_then(value)).collect();
+        Line {
+            quoted: true,
+            ..plain_line(format!("{scene}: {name}"), &values, decimals)
         }
-    }
-    Some(
-        Block::table(
-            format!("Renderings, {width} wide, tree {tree}, collapse {collapse}"),
-            text,
-            own.iter().map(|row| order_name(plan, row)),
-            lines,
-        )
-        .wide(),
-    )
+    })
 }

@@ -4,7 +4,7 @@ use antumbra::recipe::{Builder, Collapse, Order};
 
 use super::blocks::{Block, Cell, Line, words};
 use super::charts::{Dot, Dots, Points};
-use super::summary;
+use super::{sort_by_speed, summary};
 use crate::Error;
 use crate::study::{Kind, Plan, Row, Trained};
 use crate::table::count;
@@ -25,14 +25,7 @@ pub fn strip(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Block, Error> {
             bold: row.is_on(tree.name(), collapse.name()),
         })
     });
-    let dots = Dots {
-        dots: dots.collect(),
-        lines: orders.clone(),
-        series: series.clone(),
-        axis: "node tests per ray".into(),
-        from_zero: false,
-        mark: None,
-    };
+    let dots = Dots::tests(orders.clone(), series.clone(), dots.collect());
     let mut text = format!(
         "{} {}, none of them learned from.",
         count(rows[0].test_rays),
@@ -54,10 +47,7 @@ pub fn strip(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Block, Error> {
 pub fn best(plan: &Plan, rows: &[&Row], kind: Kind) -> Block {
     let widths = plan.widths.len();
     let mut sorted = rows.to_vec();
-    let cost = |row: &Row| row.cost(&plan.costs);
-    let rank = |row: &Row| row.speed.unwrap_or(0.0);
-    sorted.sort_by(|a, b| rank(b).total_cmp(&rank(a)));
-    sorted.truncate(MOST_BEST);
+    sort_by_speed(&mut sorted, MOST_BEST);
     let head = [
         "cost",
         "nodes",
@@ -72,7 +62,7 @@ pub fn best(plan: &Plan, rows: &[&Row], kind: Kind) -> Block {
             name = format!("{name} {}", row.width);
         }
         let cells = vec![
-            Cell::number(cost(row), 3),
+            Cell::number(row.cost(&plan.costs), 3),
             Cell::number(row.node_tests_after, 3),
             Cell::number(row.prim_tests_after, 3),
             Cell::number(row.node_tests_occluded, 3),
@@ -310,14 +300,7 @@ pub fn transfer(
             });
         }
     }
-    let chart = Dots {
-        lines,
-        series,
-        dots,
-        axis: "node tests per ray".into(),
-        from_zero: false,
-        mark: None,
-    };
+    let chart = Dots::tests(lines, series, dots);
     Ok(Some(Block::plot(
         format!("Learned from other rays, tested on {}", words(kind)),
         format!("Tree {tree}, order {order}. Left is better."),

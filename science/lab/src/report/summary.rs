@@ -134,13 +134,11 @@ impl Summary {
         for (_, row) in &self.rows {
             let parsed = || {
                 let mut widths = self.widths.iter();
-                Some(Combination {
-                    width: *widths.find(|width| width.lanes() == row.width)?,
-                    tree: antumbra_trees::builder(&row.tree).ok()?,
-                    collapse: antumbra_trees::collapse(&row.collapse).ok()?,
-                    order: antumbra_trees::order(&row.order).ok()?,
-                    prim_cost: None,
-                })
+                let width = *widths.find(|width| width.lanes() == row.width)?;
+                let tree = antumbra_trees::builder(&row.tree).ok()?;
+                let collapse = antumbra_trees::collapse(&row.collapse).ok()?;
+                let order = antumbra_trees::order(&row.order).ok()?;
+                Some(Combination::new(width, (tree, collapse), order))
             };
             if let Some(found) = parsed().filter(|found| !seen.contains(found)) {
                 seen.push(found);

@@ -3,22 +3,24 @@
 use serde::{Deserialize, Serialize};
 
 /// How a row was measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum By {
     /// A picture, all of whose shadow rays were counted.
+    #[default]
     Render,
     /// A sample of held-out rays, which one tree answered.
     Replay,
 }
 
 /// Kinds of occlusion rays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Kind {
     /// Shadow rays of the scene's integrator.
+    #[default]
     Shadow,
     /// Ambient occlusion of what the camera sees.
     Ao,
@@ -38,11 +40,12 @@ impl Kind {
 }
 
 /// Questions that a study answers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Part {
     /// Which combination is best.
+    #[default]
     Techniques,
     /// How many training rays are enough.
     LogSize,
@@ -62,11 +65,12 @@ impl Part {
 }
 
 /// Origins of training rays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Trained {
     /// The test camera.
+    #[default]
     TestCamera,
     /// The camera chosen for training.
     TrainCamera,

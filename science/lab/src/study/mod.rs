@@ -100,31 +100,15 @@ pub fn run<'a>(plan: &'a Plan, watcher: &dyn Watcher) -> Result<Results<'a>, Err
 
 /// Identity of the study: everything that decides what is done.
 fn header(plan: &Plan) -> Header {
-    let list = |names: Vec<String>| names.join(",");
-    let Plan {
-        orders,
-        widths,
-        trees,
-        collapses,
-        ..
-    } = plan;
+    fn list<T: ToString>(flag: &str, all: &[T]) -> String {
+        let names: Vec<String> = all.iter().map(ToString::to_string).collect();
+        format!("--{flag} {}", names.join(","))
+    }
     let words = [
-        format!(
-            "--order {}",
-            list(orders.iter().map(ToString::to_string).collect())
-        ),
-        format!(
-            "--width {}",
-            list(widths.iter().map(ToString::to_string).collect())
-        ),
-        format!(
-            "--builder {}",
-            list(trees.iter().map(ToString::to_string).collect())
-        ),
-        format!(
-            "--collapse {}",
-            list(collapses.iter().map(ToString::to_string).collect())
-        ),
+        list("order", &plan.orders),
+        list("width", &plan.widths),
+        list("builder", &plan.trees),
+        list("collapse", &plan.collapses),
         plan.spp
             .map_or_else(String::new, |spp| format!("--spp {spp}")),
         format!("--repeat {} --seed {}", plan.repeat, plan.seed),
@@ -323,8 +307,7 @@ impl<'a> Study<'a> {
                     let title =
                         format!("{}, width {width}, {tree} {collapse} {order}", common.scene);
                     self.watcher.begin(&title);
-                    let found = bench.measure(replay, &mut collapsed)?;
-                    let row = Row::of_replay(common, replay, &found);
+                    let row = bench.measure(common, replay, &mut collapsed)?;
                     self.journal.add(replay.key(subject), row)?;
                     self.watcher.finished(Step::Replay, true);
                 }

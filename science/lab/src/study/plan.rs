@@ -108,26 +108,27 @@ pub struct Combination {
 }
 
 impl Combination {
-    /// The trees of the paper, unsorted.
-    pub fn of_the_paper(width: Width) -> Self {
+    /// A tree that learns by the cost of a primitive test that the plan says.
+    pub const fn new(width: Width, (tree, collapse): (Builder, Collapse), order: Order) -> Self {
         Self {
             width,
-            tree: Builder::BinnedSah,
-            collapse: Collapse::Area,
-            order: Order::Simple,
+            tree,
+            collapse,
+            order,
             prim_cost: None,
         }
     }
 
+    /// The trees of the paper, unsorted.
+    pub fn of_the_paper(width: Width) -> Self {
+        let tree = (Builder::BinnedSah, Collapse::Area);
+        Self::new(width, tree, Order::Simple)
+    }
+
     /// Defaults of renderings.
     pub fn default_of(width: Width) -> Self {
-        Self {
-            width,
-            tree: Builder::default(),
-            collapse: Collapse::default(),
-            order: Order::default(),
-            prim_cost: None,
-        }
+        let tree = (Builder::default(), Collapse::default());
+        Self::new(width, tree, Order::default())
     }
 }
 
@@ -227,13 +228,7 @@ impl Plan {
     /// The combinations that are compared on pictures with nodes of this width, those on the base tree first.
     pub fn rendered(&self, width: Width) -> Vec<Combination> {
         let base = self.base();
-        let of = |(tree, collapse), order| Combination {
-            width,
-            tree,
-            collapse,
-            order,
-            prim_cost: None,
-        };
+        let of = |tree, order| Combination::new(width, tree, order);
         let by_all_orders = self.orders.iter().map(|&order| of(base, order));
         let learned = || self.orders.iter().filter(|order| order.learns());
         let by_costs = self.more_prim_costs.iter().flat_map(|&cost| {
@@ -266,14 +261,7 @@ impl Plan {
     /// default, as far as they are requested, or else `simple` and the default order on the base tree.
     pub fn headline(&self, width: Width) -> Vec<Combination> {
         let all = self.rendered(width);
-        let (tree, collapse) = self.base();
-        let on_base = |order| Combination {
-            width,
-            tree,
-            collapse,
-            order,
-            prim_cost: None,
-        };
+        let on_base = |order| Combination::new(width, self.base(), order);
         let (paper, default) = (
             Combination::of_the_paper(width),
             Combination::default_of(width),
@@ -315,20 +303,14 @@ impl Plan {
             (_, None) => Trained::TestCamera,
         };
         for kind in Kind::ALL {
-            for (tree, collapse) in self.trees_and_collapses() {
+            for tree in self.trees_and_collapses() {
                 for &width in &self.widths {
                     all.extend(self.orders.iter().map(|&order| Replay {
                         part: Part::Techniques,
                         kind,
                         trained: main,
                         log_rays: None,
-                        combination: Combination {
-                            width,
-                            tree,
-                            collapse,
-                            order,
-                            prim_cost: None,
-                        },
+                        combination: Combination::new(width, tree, order),
                     }));
                 }
             }
@@ -341,7 +323,6 @@ impl Plan {
     /// The base tree and collapse, learned from fewer rays.
     fn log_sizes(&self, kind: Kind, trained: Trained, log_rays: usize) -> Vec<Replay> {
         let mut all = Vec::new();
-        let (tree, collapse) = self.base();
         let sizes = (3..).map(|power| 1 << (2 * power));
         for size in sizes.take_while(|size| *size < log_rays) {
             for &width in &self.widths {
@@ -351,13 +332,7 @@ impl Plan {
                     kind,
                     trained,
                     log_rays: Some(size),
-                    combination: Combination {
-                        width,
-                        tree,
-                        collapse,
-                        order,
-                        prim_cost: None,
-                    },
+                    combination: Combination::new(width, self.base(), order),
                 }));
             }
         }
@@ -387,13 +362,7 @@ impl Plan {
                         kind,
                         trained,
                         log_rays: None,
-                        combination: Combination {
-                            width,
-                            tree,
-                            collapse,
-                            order,
-                            prim_cost: None,
-                        },
+                        combination: Combination::new(width, (tree, collapse), order),
                     });
                 }
             }

@@ -13,10 +13,10 @@ use antumbra_scene::Camera;
 use antumbra_trees::{engine, oracle_visits};
 
 use super::cameras;
-use super::kinds::{Kind, Trained};
+use super::kinds::{By, Kind, Trained};
 use super::log_size::LogSize;
 use super::plan::{Plan, Replay, Subject};
-use super::row::{Replayed, share};
+use super::row::{Common, Row, share};
 use crate::counted::counted;
 use crate::thread_time;
 use crate::{CollapsedTree, Error, Lot, RaysFrom, SampledRays, TrainedTree};
@@ -184,12 +184,13 @@ impl<'a> Bench<'a> {
             .is_some_and(|lot| !lot.of(kind).is_empty())
     }
 
-    /// Answers the test rays.
+    /// Answers the test rays. Returns the row.
     pub fn measure(
         &mut self,
+        common: &Common,
         replay: &Replay,
         collapsed: &mut CollapsedTree,
-    ) -> Result<Replayed, Error> {
+    ) -> Result<Row, Error> {
         self.collect();
         let Some(test) = &self.test else {
             return Err(Error::report("no rays to replay"));
@@ -240,27 +241,34 @@ impl<'a> Bench<'a> {
         };
         let node_tests = |cost: &Cost| cost.node_tests;
         let occluded = answers.iter().filter(|occluded| **occluded).count();
-        let found = Replayed {
+        let row = Row {
+            part: replay.part,
+            rays: replay.kind,
+            learned_from: replay.trained,
             log_rays: collapsed.learned_from(),
             test_rays: rays.len() as u64,
             occluded_share: share(occluded as u64, rays.len() as u64),
-            node_tests: mean(node_tests, None).unwrap_or(0.0),
-            top_node_tests: mean(|cost| cost.top_node_tests, None).unwrap_or(0.0),
-            prim_tests: mean(|cost| cost.prim_tests, None).unwrap_or(0.0),
+            node_tests_after: mean(node_tests, None).or(Some(0.0)),
+            prim_tests_after: mean(|cost| cost.prim_tests, None).or(Some(0.0)),
+            top_node_tests_after: (mean(|cost| cost.top_node_tests, None).or(Some(0.0)))
+                .filter(|_| common.two_levels),
             node_tests_occluded: mean(node_tests, Some(true)),
             node_tests_unoccluded: mean(node_tests, Some(false)),
-            oracle,
-            predicted: ordered.predicted,
+            oracle_occluded: oracle[0],
+            oracle_unoccluded: oracle[1],
+            predicted_cost_before: ordered.predicted.map(|[before, _]| before),
+            predicted_cost_after: ordered.predicted.map(|[_, after]| after),
             log_seconds: (collapsed.follow_time() + ordered.log_time).as_secs_f64(),
             sort_seconds: ordered.sort_time.as_secs_f64(),
             build_seconds: collapsed.build_time().as_secs_f64(),
-            mrays_per_s: 1e-6 * rays.len() as f64 / seconds[ROUNDS / 2],
-            speed: speeds[ROUNDS / 2],
-            speed_range: [speeds[0], speeds[ROUNDS - 1]],
-            equal_answers,
+            mrays_per_s: Some(1e-6 * rays.len() as f64 / seconds[ROUNDS / 2]),
+            speed: Some(speeds[ROUNDS / 2]),
+            speed_range: Some([speeds[0], speeds[ROUNDS - 1]]),
+            equal_answers: Some(equal_answers),
+            ..Row::empty(common, &replay.combination, By::Replay)
         };
         self.reference = Some(reference);
-        Ok(found)
+        Ok(row)
     }
 }
 

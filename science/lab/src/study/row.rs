@@ -4,7 +4,7 @@ use antumbra_render::{Split, Stats};
 use serde::{Deserialize, Serialize};
 
 use super::kinds::{By, Kind, Part, Trained};
-use super::plan::{Combination, Replay};
+use super::plan::Combination;
 use crate::{Compared, ComparedTree};
 
 /// One tree of a picture, or one replay, summed up. Tests are means per occlusion ray.
@@ -12,7 +12,7 @@ use crate::{Compared, ComparedTree};
 /// Node tests are the paper's N_b, primitive tests its N_t. "Before" is measured over the training rays while they are
 /// logged, "after" over the held-out rays, both as in the paper. "Unsorted" is measured over the held-out rays too, in
 /// the tree before its children are ordered. All trees of a picture answer the same held-out rays.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Row {
     /// Name of the scene.
@@ -144,27 +144,6 @@ pub struct Common {
     pub prim_cost: f32,
 }
 
-/// Figures of a replay.
-pub struct Replayed {
-    pub log_rays: u64,
-    pub test_rays: u64,
-    pub occluded_share: f64,
-    pub node_tests: f64,
-    pub top_node_tests: f64,
-    pub prim_tests: f64,
-    pub node_tests_occluded: Option<f64>,
-    pub node_tests_unoccluded: Option<f64>,
-    pub oracle: [Option<f64>; 2],
-    pub predicted: Option<[f64; 2]>,
-    pub log_seconds: f64,
-    pub sort_seconds: f64,
-    pub build_seconds: f64,
-    pub mrays_per_s: f64,
-    pub speed: f64,
-    pub speed_range: [f64; 2],
-    pub equal_answers: bool,
-}
-
 impl Row {
     /// The row of a tree that was compared with others on a picture.
     pub fn of_picture(
@@ -175,8 +154,7 @@ impl Row {
     ) -> Self {
         let of = |tests: Option<[f64; 3]>, place: usize| tests.map(|tests| tests[place]);
         let top = |tests| of(tests, 2).filter(|_| common.two_levels);
-        let mut times = tree.render_seconds.clone();
-        times.sort_unstable_by(f64::total_cmp);
+        let (render_seconds, render_seconds_range) = middle(tree.render_seconds.clone());
         let rays = picture.shadow_rays + picture.closest_rays;
         Self {
             test_rays: picture.held_out_rays,
@@ -199,10 +177,10 @@ impl Row {
             sort_seconds: tree.order_seconds,
             remake_seconds: Some((tree.sort_seconds - tree.order_seconds).max(0.0)),
             build_seconds: tree.build_seconds,
-            render_seconds: times.get(times.len() / 2).copied(),
+            render_seconds,
             render_time: Some(RenderTime::Composed),
-            render_seconds_range: times.first().zip(times.last()).map(|(a, b)| [*a, *b]),
-            timed_renderings: times.len() as u32,
+            render_seconds_range,
+            timed_renderings: tree.render_seconds.len() as u32,
             busy_seconds: Some(tree.split),
             equal_answers: Some(tree.agrees),
             image_hash: tree.agrees.then(|| hash(picture.image_hash)),
@@ -220,42 +198,11 @@ impl Row {
         }
     }
 
-    /// The row of a replay.
-    pub fn of_replay(common: &Common, replay: &Replay, found: &Replayed) -> Self {
-        Self {
-            part: replay.part,
-            rays: replay.kind,
-            learned_from: replay.trained,
-            log_rays: found.log_rays,
-            test_rays: found.test_rays,
-            occluded_share: found.occluded_share,
-            node_tests_after: Some(found.node_tests),
-            prim_tests_after: Some(found.prim_tests),
-            top_node_tests_after: Some(found.top_node_tests).filter(|_| common.two_levels),
-            node_tests_occluded: found.node_tests_occluded,
-            node_tests_unoccluded: found.node_tests_unoccluded,
-            oracle_occluded: found.oracle[0],
-            oracle_unoccluded: found.oracle[1],
-            predicted_cost_before: found.predicted.map(|[before, _]| before),
-            predicted_cost_after: found.predicted.map(|[_, after]| after),
-            log_seconds: found.log_seconds,
-            sort_seconds: found.sort_seconds,
-            build_seconds: found.build_seconds,
-            mrays_per_s: Some(found.mrays_per_s),
-            speed: Some(found.speed),
-            speed_range: Some(found.speed_range),
-            equal_answers: Some(found.equal_answers),
-            ..Self::empty(common, &replay.combination, By::Replay)
-        }
-    }
-
     /// A row about a combination, without any figures.
-    fn empty(common: &Common, combination: &Combination, by: By) -> Self {
+    pub(super) fn empty(common: &Common, combination: &Combination, by: By) -> Self {
         Self {
             scene: common.scene.clone(),
             by,
-            part: Part::Techniques,
-            rays: Kind::Shadow,
             triangles: common.triangles,
             width: combination.width.lanes(),
             tree: combination.tree.name().to_owned(),
@@ -265,58 +212,18 @@ impl Row {
             level: common.level.clone(),
             threads: common.threads,
             spp: common.spp,
-            learned_from: Trained::TestCamera,
-            log_rays: 0,
-            test_rays: 0,
-            shadow_rays: None,
-            shadow_share: None,
-            occluded_share: 0.0,
-            node_tests_before: None,
-            prim_tests_before: None,
-            node_tests_unsorted: None,
-            prim_tests_unsorted: None,
-            node_tests_after: None,
-            prim_tests_after: None,
-            top_node_tests_before: None,
-            top_node_tests_unsorted: None,
-            top_node_tests_after: None,
-            node_tests_occluded: None,
-            node_tests_unoccluded: None,
-            oracle_occluded: None,
-            oracle_unoccluded: None,
-            predicted_cost_before: None,
-            predicted_cost_after: None,
-            log_seconds: 0.0,
-            sort_seconds: 0.0,
-            remake_seconds: None,
-            build_seconds: 0.0,
-            render_seconds: None,
-            render_time: None,
-            render_seconds_range: None,
-            timed_renderings: 0,
-            measured_seconds: None,
-            measured_seconds_range: None,
-            measured_renderings: 0,
-            busy_seconds: None,
-            mrays_per_s: None,
-            speed: None,
-            speed_range: None,
-            equal_answers: None,
-            image_hash: None,
+            ..Self::default()
         }
     }
 
     /// Takes over the times of whole pictures with this tree that were rendered apart. A picture of other bits
     /// counts as different answers: it fails the [verdict](super::Results::verdict).
     pub fn measured(&mut self, pictures: &[&Self]) {
-        let mut times: Vec<f64> = pictures
-            .iter()
+        let times: Vec<f64> = (pictures.iter())
             .filter_map(|row| row.render_seconds)
             .collect();
-        times.sort_unstable_by(f64::total_cmp);
         self.measured_renderings = times.len() as u32;
-        self.measured_seconds = times.get(times.len() / 2).copied();
-        self.measured_seconds_range = times.first().zip(times.last()).map(|(a, b)| [*a, *b]);
+        (self.measured_seconds, self.measured_seconds_range) = middle(times);
         if pictures.iter().any(|row| row.image_hash != self.image_hash) {
             self.equal_answers = Some(false);
         }
@@ -338,6 +245,14 @@ impl Row {
     pub fn is_on(&self, tree: &str, collapse: &str) -> bool {
         self.tree == tree && self.collapse == collapse
     }
+}
+
+/// The middle of some times, and the least and the most.
+fn middle(mut times: Vec<f64>) -> (Option<f64>, Option<[f64; 2]>) {
+    times.sort_unstable_by(f64::total_cmp);
+    let ends = times.first().zip(times.last());
+    let ends = ends.map(|(least, most)| [*least, *most]);
+    (times.get(times.len() / 2).copied(), ends)
 }
 
 /// A hash as results have it.
