@@ -1,4 +1,4 @@
-//! Batches by their sizes, beside Embree's calls of 1, 4, 8 and 16 rays; and by what they are asked.
+//! Batches by their sizes, beside Embree's calls of 1, 4, 8 and 16 rays; and by their conditions.
 
 use std::ops::Range;
 
@@ -56,7 +56,7 @@ pub fn sizes(bench: &mut Bench, name: &str, mesh: &Mesh, rays: &[Ray]) -> Outcom
             bvh.batch(columns).on_this_thread().occluded_into(answers);
         }
     });
-    Ok(case.run(bench, 0.0)?)
+    Ok(case.run(bench, [0.0; 2])?)
 }
 
 /// Conditions, surfaces and occluders, relative to plain batches of the same rays. No condition leaves anything out.
@@ -106,7 +106,7 @@ pub fn conditions(bench: &mut Bench, name: &str, mesh: &Mesh, rays: &[Ray]) -> O
     case.add("surfaces", vec![None; rays.len()], |all| {
         pieces(all, |range, all| batch(range).surfaces_into(all));
     });
-    Ok(case.run(bench, 0.0)?)
+    Ok(case.run(bench, [0.0; 2])?)
 }
 
 /// Answers in pieces, of as many rays as a call has.

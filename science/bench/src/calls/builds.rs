@@ -31,7 +31,7 @@ pub fn run(bench: &mut Bench, name: &str, input: &Input) -> Outcome {
                 (0..repeat).for_each(|_| drop(Bvh::build(geometry, recipe)));
             });
         }
-        case.run(bench, 0.0)?;
+        case.run(bench, [0.0; 2])?;
     }
     let build = |(name, recipe)| {
         (
@@ -51,7 +51,7 @@ pub fn run(bench: &mut Bench, name: &str, input: &Input) -> Outcome {
         };
         case.base(trees[0].0, vec![false; rays.len()], answer(&trees[0].1));
         case.add(trees[1].0, vec![false; rays.len()], answer(&trees[1].1));
-        case.run(bench, 0.0)?;
+        case.run(bench, [0.0; 2])?;
     }
     Ok(())
 }

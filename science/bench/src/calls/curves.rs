@@ -57,7 +57,7 @@ fn compare(bench: &mut Bench, name: &str, (bvh, scene): (&Bvh, &Scene), rays: &[
     case.add("batch.intersect", vec![None; rays.len()], |hits| {
         bvh.batch(rays).on_this_thread().intersect_into(hits);
     });
-    Ok(case.run(bench, TOLERANCE)?)
+    Ok(case.run(bench, [TOLERANCE, 0.0])?)
 }
 
 /// Hairs that grow from a sphere, bent by chance.

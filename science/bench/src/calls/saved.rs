@@ -61,7 +61,7 @@ pub fn run(bench: &mut Bench) -> Outcome {
             (add, "World::to_bytes", world.to_bytes());
             (add, "World::read", World::read(&of_world[..]).expect(what));
         }
-        case.run(bench, 0.0)?;
+        case.run(bench, [0.0; 2])?;
     }
     Ok(())
 }

@@ -34,7 +34,7 @@ pub fn run(bench: &mut Bench, name: &str, mesh: &Mesh, rays: &[Ray]) -> Outcome 
     case.add("batch.visit_hits", vec![1.0; rays.len()], |lights| {
         bvh.batch(rays).on_this_thread().visit_hits(lights, visit);
     });
-    Ok(case.run(bench, 0.0)?)
+    Ok(case.run(bench, [0.0; 2])?)
 }
 
 /// Panes at places of a low-discrepancy sequence in the bounds of a mesh, upright, towards either axis.

@@ -45,7 +45,8 @@ pub fn run(job: &mut Job, side: usize) -> Outcome {
         .collect();
     let rays =
         |sun: [f32; 3]| -> Vec<Ray> { points.iter().map(|&point| Ray::new(point, sun)).collect() };
-    let tinted = |trace: &dyn Fn(&[Ray], &mut [[f32; 3]])| {
+    type Trace<'a> = &'a dyn Fn(&[Ray], &mut [[f32; 3]]);
+    let tinted = |trace: Trace| {
         let mut lights = vec![[1.0f32; 3]; points.len() * suns.len()];
         for (&sun, lights) in suns.iter().zip(lights.chunks_mut(points.len())) {
             trace(&rays(sun), lights);

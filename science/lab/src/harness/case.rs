@@ -1,4 +1,4 @@
-//! Works on the same questions, measured in turns, and the record of all of them.
+//! Works on the same questions, measured interleaved, and the record of all of them.
 
 use std::fmt;
 use std::path::Path;
@@ -20,7 +20,7 @@ const RAYS: usize = 1 << 16;
 pub struct Bench {
     /// Rounds in which every work is timed once.
     pub rounds: usize,
-    /// One question in so many is asked.
+    /// Every so many-th question is put, to try a case.
     pub part: usize,
     pool: ThreadPool,
     device: Option<Arc<Device>>,
@@ -38,7 +38,7 @@ struct Record {
     embree: Option<String>,
     tree: Tree,
     rounds: usize,
-    /// One question in so many was asked.
+    /// Every so many-th question was put.
     part: usize,
     rows: Vec<Row>,
 }
@@ -55,7 +55,7 @@ struct Tree {
 /// One work of a case.
 #[derive(Serialize)]
 pub struct Row {
-    /// What is asked.
+    /// The questions.
     pub case: String,
     /// Who answers, and how.
     pub work: String,
@@ -67,7 +67,7 @@ pub struct Row {
     pub over: String,
     /// Median, least and most of the rounds.
     pub speedup: [f64; 3],
-    /// Answers that differ from those of that work.
+    /// Answers that differ from the answers of that work.
     pub differ: usize,
     /// Part of the time that went into building; null for a call.
     pub build_seconds: Option<f64>,
@@ -231,11 +231,11 @@ impl<'a> Case<'a> {
         self.works.push((name.into(), base, work(fresh, run)));
     }
 
-    /// Measures all works. Distances may differ by so much of themselves.
+    /// Measures all works. Distances may differ by so much of themselves, and absolutely.
     ///
     /// # Errors
     /// A failure of the harness.
-    pub fn run(self, bench: &mut Bench, tolerance: f32) -> Result<(), Error> {
+    pub fn run(self, bench: &mut Bench, tolerance: [f32; 2]) -> Result<(), Error> {
         let (names, teams): (Vec<_>, Vec<_>) = self
             .works
             .into_iter()
@@ -251,7 +251,7 @@ impl<'a> Case<'a> {
                 seconds: spread(seconds.iter().copied()),
                 over: names[*base].0.clone(),
                 speedup: spread(ratios(seconds, &other.seconds)),
-                differ: answers.differing_from(&other.answers, tolerance),
+                differ: answers.differing_by(&other.answers, tolerance),
                 build_seconds: None,
                 lines: None,
             });

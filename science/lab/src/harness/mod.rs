@@ -38,16 +38,24 @@ impl Answers {
     /// # Panics
     /// If they answer different kinds or numbers of questions.
     pub fn differing_from(&self, other: &Self, tolerance: f32) -> usize {
+        self.differing_by(other, [tolerance, 0.0])
+    }
+
+    /// The same, with a tolerance relative to the other distance and an absolute one on top of it.
+    ///
+    /// # Panics
+    /// As [`Self::differing_from`].
+    pub fn differing_by(&self, other: &Self, [relative, absolute]: [f32; 2]) -> usize {
         assert_eq!(self.len(), other.len(), "answers to the same questions");
         match (self, other) {
             (Self::Occluded(a), Self::Occluded(b)) => {
                 a.iter().zip(b).filter(|(a, b)| a != b).count()
             }
             (Self::Distances(a), Self::Distances(b)) => {
+                let tolerance = |b: f32| relative * b.abs() + absolute;
                 // Any distance is near infinity by that measure.
-                let near = |a: f32, b: f32| b.is_finite() && (a - b).abs() <= tolerance * b.abs();
-                let same = |a: f32, b: f32| a == b || near(a, b);
-                let differs = |(a, b): &(&f32, &f32)| !same(**a, **b);
+                let near = |a: f32, b: f32| b.is_finite() && (a - b).abs() <= tolerance(b);
+                let differs = |(a, b): &(&f32, &f32)| *a != *b && !near(**a, **b);
                 a.iter().zip(b).filter(differs).count()
             }
             _ => panic!("answers to different questions"),
