@@ -1,89 +1,58 @@
 //! Three small programs, each written with three crates: a baker of ambient occlusion, a matrix of who sees whom, and a world
-//! of instances. Prints how long they take, how they differ and how long their texts are.
+//! of instances; and nearest points of scenes beside parry3d. Cases of the harness: everything runs on one thread, in turns.
 //!
-//!     cargo run --release --manifest-path science/bench/rust-crates/Cargo.toml -- [--rounds N] [--small] [--json FILE]
+//!     cargo run --release --manifest-path science/bench/rust-crates/Cargo.toml -- [--rounds N] [--part N] [--json FILE] [SCENE...]
 //!
-//! Everything runs on one thread, the crates in turns. Set `RAYON_NUM_THREADS=1` for builds on one thread as well, and
-//! `RUSTFLAGS="-C target-cpu=native"` for the other crates: antumbra chooses its instruction set by itself.
+//! Without scenes the programs run. Set `RUSTFLAGS="-C target-cpu=native"` for the other crates: antumbra chooses its instruction
+//! set by itself.
 
 mod input;
 mod with_antumbra;
 mod with_bvh;
 mod with_obvhs;
+mod with_parry;
 
-use std::time::Instant;
+use std::convert::Infallible;
+use std::path::PathBuf;
 
-use serde::Serialize;
+use antumbra_lab::harness::{Answers, Bench, Row, TOLERANCE, interleave, median, ratios, spread};
+use antumbra_lab::thread_seconds;
 
 use input::{Mesh, Ray};
 
-/// What a program found.
-#[derive(PartialEq)]
-pub enum Answers {
-    /// Which rays are occluded.
-    Bits(Vec<bool>),
-    /// Distances of closest hits, and which of the hits lie in shadow.
-    Shaded {
-        distances: Vec<f32>,
-        occluded: Vec<bool>,
-    },
+/// What a program found: which rays are occluded; or distances of closest hits, and which of the hits lie in shadow.
+#[derive(Clone, Default)]
+pub struct Found {
+    pub distances: Vec<f32>,
+    pub occluded: Vec<bool>,
 }
 
-impl Answers {
+impl Found {
+    /// Rays of which some are occluded.
+    pub fn of(occluded: Vec<bool>) -> Self {
+        Self {
+            occluded,
+            ..Self::default()
+        }
+    }
+
     fn rays(&self) -> usize {
-        match self {
-            Self::Bits(bits) => bits.len(),
-            Self::Shaded {
-                distances,
-                occluded,
-            } => distances.len() + occluded.len(),
-        }
+        self.distances.len() + self.occluded.len()
     }
 
-    fn occluded(&self) -> usize {
-        match self {
-            Self::Bits(bits) | Self::Shaded { occluded: bits, .. } => {
-                bits.iter().filter(|bit| **bit).count()
-            }
-        }
-    }
-
-    /// Answers that differ: bits, and distances by more than 1e-4 of themselves.
+    /// Answers that differ. Where the sets of hits differ, shadows cannot be compared one by one.
     fn differences(&self, other: &Self) -> usize {
-        let count = |a: &[bool], b: &[bool]| {
-            a.iter().zip(b).filter(|(a, b)| a != b).count() + a.len().abs_diff(b.len())
-        };
-        match (self, other) {
-            (Self::Bits(a), Self::Bits(b)) => count(a, b),
-            (
-                Self::Shaded {
-                    distances: a,
-                    occluded: own,
-                },
-                Self::Shaded {
-                    distances: b,
-                    occluded: others,
-                },
-            ) => {
-                let far = a.iter().zip(b).filter(|(a, b)| {
-                    a != b
-                        && (**a - **b).abs().partial_cmp(&(1e-4 * **a))
-                            != Some(std::cmp::Ordering::Less)
-                });
-                // Where the sets of hits differ, shadows cannot be compared one by one.
-                far.count()
-                    + if own.len() == others.len() {
-                        count(own, others)
-                    } else {
-                        0
-                    }
-            }
-            _ => usize::MAX,
+        let distances = |found: &Self| Answers::Distances(found.distances.clone());
+        let occluded = |found: &Self| Answers::Occluded(found.occluded.clone());
+        let far = distances(other).differing_from(&distances(self), TOLERANCE);
+        match self.occluded.len() == other.occluded.len() {
+            true => far + occluded(other).differing_from(&occluded(self), 0.0),
+            false => far,
         }
     }
 }
 
-/// Seconds of one run.
+/// CPU seconds of one run.
 #[derive(Default)]
 pub struct Timed {
     build: f64,
@@ -92,16 +61,16 @@ pub struct Timed {
 
 impl Timed {
     pub fn build<T>(&mut self, work: impl FnOnce() -> T) -> T {
-        let start = Instant::now();
+        let start = thread_seconds();
         let result = work();
-        self.build = start.elapsed().as_secs_f64();
+        self.build = thread_seconds() - start;
         result
     }
 
-    pub fn trace(&mut self, work: impl FnOnce() -> Answers) -> Answers {
-        let start = Instant::now();
+    pub fn trace(&mut self, work: impl FnOnce() -> Found) -> Found {
+        let start = thread_seconds();
         let result = work();
-        self.trace = start.elapsed().as_secs_f64();
+        self.trace = thread_seconds() - start;
         result
     }
 }
@@ -132,160 +101,93 @@ fn lines(text: &str, program: &str) -> usize {
         .sum()
 }
 
-/// A row of the table.
-#[derive(Serialize)]
-struct Row {
-    program: &'static str,
-    name: &'static str,
-    lines: usize,
-    build_seconds: f64,
-    rays: usize,
-    occluded: usize,
-    mrays_per_second: f64,
-    /// Rate of antumbra over that of this crate: the median of the rounds and the extremes.
-    antumbra_faster: [f64; 3],
-    differences: usize,
-}
-
-fn median(mut values: Vec<f64>) -> [f64; 3] {
-    values.sort_by(f64::total_cmp);
-    [
-        values[values.len() / 2],
-        values[0],
-        values[values.len() - 1],
-    ]
-}
-
 /// Runs a program with every crate, in turns.
-fn compare(
-    program: &'static str,
-    rounds: usize,
-    runs: [&dyn Fn(&mut Timed) -> Answers; 3],
-) -> Vec<Row> {
-    let mut times: [Vec<Timed>; 3] = Default::default();
-    let mut answers: Vec<Answers> = Vec::new();
-    for round in 0..rounds {
-        for (index, run) in runs.iter().enumerate() {
-            let mut timed = Timed::default();
-            let found = run(&mut timed);
-            times[index].push(timed);
-            if round == 0 {
-                answers.push(found);
-            }
-        }
+fn compare(bench: &mut Bench, program: &'static str, runs: [&dyn Fn(&mut Timed) -> Found; 3]) {
+    let mut found = [const { None }; 3];
+    let Ok(times) = interleave(bench.rounds, 3, |which| {
+        let mut timed = Timed::default();
+        found[which] = Some(runs[which](&mut timed));
+        Ok::<_, Infallible>(timed)
+    });
+    let found = found.map(|found| found.expect("a run"));
+    let traces = |of: usize| times[of].iter().map(|timed| timed.trace);
+    let ours: Vec<f64> = traces(0).collect();
+    for (which, (name, text)) in CRATES.into_iter().enumerate() {
+        let own: Vec<f64> = traces(which).collect();
+        bench.add(Row {
+            case: program.to_owned(),
+            work: name.to_owned(),
+            count: found[which].rays(),
+            seconds: spread(own.iter().copied()),
+            over: CRATES[0].0.to_owned(),
+            speedup: spread(ratios(&own, &ours)),
+            differ: found[0].differences(&found[which]),
+            build_seconds: Some(median(times[which].iter().map(|timed| timed.build))),
+            lines: Some(lines(text, program)),
+        });
     }
-    (0..3)
-        .map(|index| {
-            let (name, text) = CRATES[index];
-            let trace = median(times[index].iter().map(|timed| timed.trace).collect())[0];
-            let ratios = times[index]
-                .iter()
-                .zip(&times[0])
-                .map(|(own, ours)| own.trace / ours.trace);
-            Row {
-                program,
-                name,
-                lines: lines(text, program),
-                build_seconds: median(times[index].iter().map(|timed| timed.build).collect())[0],
-                rays: answers[index].rays(),
-                occluded: answers[index].occluded(),
-                mrays_per_second: answers[index].rays() as f64 / trace / 1e6,
-                antumbra_faster: median(ratios.collect()),
-                differences: answers[0].differences(&answers[index]),
-            }
-        })
-        .collect()
 }
 
-fn main() {
-    let mut args = std::env::args().skip(1);
-    let (mut rounds, mut small, mut json) = (3, false, None);
-    while let Some(arg) = args.next() {
-        match arg.as_str() {
-            "--rounds" => {
-                rounds = args
-                    .next()
-                    .and_then(|n| n.parse().ok())
-                    .filter(|n| *n > 0)
-                    .expect("--rounds takes a number")
-            }
-            "--small" => small = true,
-            "--json" => json = Some(args.next().expect("--json takes a file")),
-            _ => panic!("unknown argument {arg}; known are --rounds N, --small, --json FILE"),
-        }
-    }
-    let size = |whole: usize| if small { whole / 10 } else { whole };
+/// The three programs.
+fn programs(bench: &mut Bench) {
+    let size = |whole: usize| whole / bench.part;
     let city: Mesh = input::city(size(340) as u32, size(3000));
     let baking: Vec<Ray> = input::baking_rays(&city, 16);
     let points = input::points(size(2000));
     let torus = input::torus(48, 24);
     let places = input::places(size(10_000));
     let camera = input::camera(size(1000));
-    println!(
-        "{} triangles, {} instances of {} triangles",
-        city.triangles.len(),
-        places.len(),
-        torus.triangles.len()
-    );
-
-    let mut rows = compare(
+    compare(
+        bench,
         "baker",
-        rounds,
         [
             &|timed| with_antumbra::bake(&city, &baking, timed),
             &|timed| with_obvhs::bake(&city, &baking, timed),
             &|timed| with_bvh::bake(&city, &baking, timed),
         ],
     );
-    rows.extend(compare(
+    compare(
+        bench,
         "visibility",
-        rounds,
         [
             &|timed| with_antumbra::see(&city, &points, timed),
             &|timed| with_obvhs::see(&city, &points, timed),
             &|timed| with_bvh::see(&city, &points, timed),
         ],
-    ));
-    rows.extend(compare(
+    );
+    compare(
+        bench,
         "instances",
-        rounds,
         [
             &|timed| with_antumbra::shade(&torus, &places, &camera, timed),
             &|timed| with_obvhs::shade(&torus, &places, &camera, timed),
             &|timed| with_bvh::shade(&torus, &places, &camera, timed),
         ],
-    ));
-
-    println!(
-        "{:<11} {:<9} {:>5} {:>8} {:>9} {:>8} {:>7} {:>22} {:>11}",
-        "program",
-        "crate",
-        "lines",
-        "build s",
-        "rays",
-        "occluded",
-        "Mray/s",
-        "antumbra is faster by",
-        "differences"
     );
-    for row in &rows {
-        let [middle, least, most] = row.antumbra_faster;
-        println!(
-            "{:<11} {:<9} {:>5} {:>8.3} {:>9} {:>7.1}% {:>7.2} {:>22} {:>11}",
-            row.program,
-            row.name,
-            row.lines,
-            row.build_seconds,
-            row.rays,
-            100.0 * row.occluded as f64 / row.rays as f64,
-            row.mrays_per_second,
-            format!("{middle:.2} ({least:.2} to {most:.2})"),
-            row.differences,
-        );
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    // Builds of one thread, which is this one.
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1);
+    pool.use_current_thread().build_global()?;
+    let mut args = std::env::args().skip(1);
+    let (mut rounds, mut part, mut json, mut scenes) = (3, 1, None, Vec::new());
+    while let Some(arg) = args.next() {
+        let mut value = || args.next().ok_or(format!("{arg} takes a value"));
+        match arg.as_str() {
+            "--rounds" => rounds = value()?.parse()?,
+            "--part" => part = value()?.parse()?,
+            "--json" => json = Some(PathBuf::from(value()?)),
+            _ => scenes.push(arg),
+        }
     }
-    if let Some(path) = json {
-        let text = serde_json::to_string_pretty(&rows).expect("numbers and names");
-        std::fs::write(&path, text + "\n")
-            .unwrap_or_else(|error| panic!("cannot write {path}: {error}"));
+    let folder = env!("CARGO_MANIFEST_DIR").as_ref();
+    let mut bench = Bench::new(folder, None, (rounds, part), |row| println!("{row}"))?;
+    if scenes.is_empty() {
+        programs(&mut bench);
     }
+    for scene in &scenes {
+        with_parry::run(&mut bench, scene, &Mesh::read(scene)?)?;
+    }
+    Ok(json.map_or(Ok(()), |path| bench.write(&path))?)
 }

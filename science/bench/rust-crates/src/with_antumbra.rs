@@ -3,7 +3,7 @@
 use antumbra::{Bvh, Geometry, Instance, Primitives, Ray as KernelRay, Recipe};
 
 use crate::input::{LIGHT, Mesh, Ray};
-use crate::{Answers, Timed};
+use crate::{Found, Timed};
 
 fn ray(ray: &Ray) -> KernelRay {
     KernelRay {
@@ -22,16 +22,16 @@ fn build(mesh: &Mesh) -> Bvh {
 }
 
 // baker
-pub fn bake(mesh: &Mesh, rays: &[Ray], timed: &mut Timed) -> Answers {
+pub fn bake(mesh: &Mesh, rays: &[Ray], timed: &mut Timed) -> Found {
     let bvh = timed.build(|| build(mesh));
     timed.trace(|| {
         let rays: Vec<KernelRay> = rays.iter().map(ray).collect();
-        Answers::Bits(bvh.batch(&rays).on_this_thread().occluded())
+        Found::of(bvh.batch(&rays).on_this_thread().occluded())
     })
 }
 
 // visibility
-pub fn see(mesh: &Mesh, points: &[[f32; 3]], timed: &mut Timed) -> Answers {
+pub fn see(mesh: &Mesh, points: &[[f32; 3]], timed: &mut Timed) -> Found {
     let bvh = timed.build(|| build(mesh));
     timed.trace(|| {
         let mut occluded = Vec::with_capacity(points.len() * points.len() / 2);
@@ -42,12 +42,12 @@ pub fn see(mesh: &Mesh, points: &[[f32; 3]], timed: &mut Timed) -> Answers {
                 .collect();
             occluded.extend(bvh.batch(&rays).on_this_thread().occluded());
         }
-        Answers::Bits(occluded)
+        Found::of(occluded)
     })
 }
 
 // instances
-pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Timed) -> Answers {
+pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Timed) -> Found {
     let bvh = timed.build(|| {
         let geometry = [Geometry::triangles(
             &mesh.positions[..],
@@ -78,7 +78,7 @@ pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Ti
             .iter()
             .map(|hit| hit.map_or(f32::INFINITY, |hit| hit.t))
             .collect();
-        Answers::Shaded {
+        Found {
             distances,
             occluded,
         }

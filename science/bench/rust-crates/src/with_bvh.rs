@@ -7,7 +7,7 @@ use bvh::ray::Ray as BvhRay;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use crate::input::{LIGHT, Mesh, Ray};
-use crate::{Answers, Timed};
+use crate::{Found, Timed};
 
 struct Triangle {
     corners: [Point3<f32>; 3],
@@ -87,19 +87,19 @@ fn ray(ray: &Ray) -> (BvhRay<f32, 3>, f32, f32) {
 }
 
 // baker
-pub fn bake(mesh: &Mesh, rays: &[Ray], timed: &mut Timed) -> Answers {
+pub fn bake(mesh: &Mesh, rays: &[Ray], timed: &mut Timed) -> Found {
     let tree = timed.build(|| build(mesh));
     timed.trace(|| {
         let occluded = rays.iter().map(|r| {
             let (ray, near, far) = ray(r);
             tree.occluded(&ray, near, far)
         });
-        Answers::Bits(occluded.collect())
+        Found::of(occluded.collect())
     })
 }
 
 // visibility
-pub fn see(mesh: &Mesh, points: &[[f32; 3]], timed: &mut Timed) -> Answers {
+pub fn see(mesh: &Mesh, points: &[[f32; 3]], timed: &mut Timed) -> Found {
     let tree = timed.build(|| build(mesh));
     timed.trace(|| {
         let mut occluded = Vec::with_capacity(points.len() * points.len() / 2);
@@ -109,7 +109,7 @@ pub fn see(mesh: &Mesh, points: &[[f32; 3]], timed: &mut Timed) -> Answers {
                 occluded.push(tree.occluded(&BvhRay::new(from.into(), dir), 0.0, dir.norm()));
             }
         }
-        Answers::Bits(occluded)
+        Found::of(occluded)
     })
 }
 
@@ -164,7 +164,7 @@ impl Placed {
     }
 }
 
-pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Timed) -> Answers {
+pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Timed) -> Found {
     let (torus, placed, world) = timed.build(|| {
         let torus = build(mesh);
         let own = torus
@@ -195,7 +195,7 @@ pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Ti
                 }));
             }
         }
-        Answers::Shaded {
+        Found {
             distances,
             occluded,
         }

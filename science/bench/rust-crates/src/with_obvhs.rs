@@ -11,7 +11,7 @@ use obvhs::triangle::Triangle;
 use obvhs::{Boundable, BvhBuildParams};
 
 use crate::input::{LIGHT, Mesh, Ray};
-use crate::{Answers, Timed};
+use crate::{Found, Timed};
 
 /// Triangles in the order of the leaves, and the tree.
 struct Tree {
@@ -58,13 +58,13 @@ fn ray(ray: &Ray) -> ObvhsRay {
 }
 
 // baker
-pub fn bake(mesh: &Mesh, rays: &[Ray], timed: &mut Timed) -> Answers {
+pub fn bake(mesh: &Mesh, rays: &[Ray], timed: &mut Timed) -> Found {
     let tree = timed.build(|| build(mesh));
-    timed.trace(|| Answers::Bits(rays.iter().map(|r| tree.occluded(ray(r))).collect()))
+    timed.trace(|| Found::of(rays.iter().map(|r| tree.occluded(ray(r))).collect()))
 }
 
 // visibility
-pub fn see(mesh: &Mesh, points: &[[f32; 3]], timed: &mut Timed) -> Answers {
+pub fn see(mesh: &Mesh, points: &[[f32; 3]], timed: &mut Timed) -> Found {
     let tree = timed.build(|| build(mesh));
     timed.trace(|| {
         let mut occluded = Vec::with_capacity(points.len() * points.len() / 2);
@@ -81,7 +81,7 @@ pub fn see(mesh: &Mesh, points: &[[f32; 3]], timed: &mut Timed) -> Answers {
                 occluded.push(tree.occluded(ray));
             }
         }
-        Answers::Bits(occluded)
+        Found::of(occluded)
     })
 }
 
@@ -147,7 +147,7 @@ impl World {
     }
 }
 
-pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Timed) -> Answers {
+pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Timed) -> Found {
     let world = timed.build(|| World::new(mesh, places));
     timed.trace(|| {
         let (mut distances, mut occluded) = (Vec::new(), Vec::new());
@@ -170,7 +170,7 @@ pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Ti
                 }));
             }
         }
-        Answers::Shaded {
+        Found {
             distances,
             occluded,
         }
