@@ -66,118 +66,41 @@
 //! a tree that learned from rays of the job. [`Sensors`] and [`Atlas`] make points of meshes, grids, tables and textures.
 //!
 //! # Files
-//! - `job`: jobs and their keys;  `work`, `part`: chunks of a job, and files of them;  `learn`: trees that learn from a job
-//! - `occlusion_job`, `sunlight`, `visibility_job`: one job each
-//! - `mesh`, `sensors`, `table`, `atlas`: points that are baked
-//! - `bodies`: what is closed, and which way it faces;  `surfaces`: roofs, facades and ground, and what is covered
-//! - `groups`: triangles of an object, a material or a facade, and means over their sensors
-//! - `placement`: sensors on roofs, facades and ground, and along lines
-//! - `ambient_occlusion`: the open part of the sky above points
-//! - `view_factors`: light that goes from surface to surface
-//! - `curvature`: lines of sight over a round earth
-//! - `viewshed`: cells of a `height_field` that observers see;  `sweep`, `horizon`: edges of the field as an eye sees them
-//! - `horizon_angles`: how high surfaces reach in each azimuth, by rays;  `field_horizon`: the same of height fields, exactly
-//! - `visibility`: directions and points that points see;  `exposure`: sums of what they see
-//! - `sky`: the sky in patches;  `sun`: where the sun is;  `moment`, `clock`: dates, times of day and time zones
-//! - `hourly`: values step by step;  `measures`: classes of sunlight, reflected light
-//! - `perez`: the light of the sky;  `epw`: weather files
-//! - `orientation`: where up and north are in a scene
-//! - `bits`: matrices of one bit per answer
-//! - `directions`: directions over a hemisphere, spread evenly and different at every point
-//! - `normals`: normals of vertices from the triangles around them
-//! - `npz`: arrays for numpy;  `ply`, `glb`: meshes with a value at every vertex as files
+//! A folder uses itself and the folders before it, but for the sky, which decides what is covered:
+//! - `points`: what is baked. `mesh`, `normals`, `creases`, `bodies`: meshes, and which way they face;  `surfaces`: roofs, facades and
+//!   ground;  `sensors`, `placement`, `table`, `atlas`: points of them;  `groups`: means over their sensors;  `curve`: points in an
+//!   order in which neighbours are near each other
+//! - `jobs`: `job`: what a bake is, and its key;  `work`, `part`: chunks of a job, and files of them;  `learn`: trees that learn from a job
+//! - `sight`: rays. `ambient_occlusion`, `openness`: the open part of the sky, and its job;  `visibility`, `eyes`: directions and
+//!   points that points see, and the job of the latter;  `horizon_angles`, `view_factors`: one job each;  `bits`: matrices of one
+//!   bit per answer;  `directions`: directions over a hemisphere;  `curvature`: lines of sight over a round earth
+//! - `sun`: `position`: where the sun is;  `sky`, `perez`: the sky in patches, and its light;  `moment`, `clock`, `epw`: dates, time
+//!   zones, weather files;  `sunlight`: the job of a period;  `exposure`, `hourly`, `measures`: sums, steps and classes
+//! - `rasters`: `height_field`: heights as a surface;  `viewshed`, `field_horizon`: one job each;  `sweep`, `horizon`: edges of the
+//!   field as an eye sees them
+//! - `files`: `npz`: arrays for numpy;  `ply`, `glb`: meshes with a value at every vertex
+//! - `vector`, `orientation`: vectors, and where up and north are in a scene
 //! - `monitor`: progress and cancellation;  `error`: why there is no result;  `memory`: lists that may not fit
 #![forbid(unsafe_code)]
 
-mod ambient_occlusion;
-mod atlas;
-mod bits;
-mod bodies;
-mod clock;
-mod creases;
-mod curvature;
-mod curve;
-mod directions;
-mod epw;
 mod error;
-mod exposure;
-mod field_horizon;
-mod glb;
-mod groups;
-mod height_field;
-mod horizon;
-mod horizon_angles;
-mod hourly;
-mod job;
-mod learn;
-mod measures;
+mod files;
+mod jobs;
 mod memory;
-mod mesh;
-mod moment;
 mod monitor;
-mod normals;
-mod npz;
-mod occlusion_job;
 mod orientation;
-mod part;
-mod perez;
-mod placement;
-mod ply;
-mod sensors;
-mod sky;
+mod points;
+mod rasters;
+mod sight;
 mod sun;
-mod sunlight;
-mod surfaces;
-mod sweep;
-mod table;
-mod view_factors;
-mod viewshed;
-mod visibility;
-mod visibility_job;
-mod work;
+mod vector;
 
-pub use ambient_occlusion::{
-    AmbientOcclusion, BentNormal, ambient_occlusion, ambient_rays, bent_normals,
-};
-pub use atlas::Atlas;
-pub use bits::{BitMatrix, ones};
-pub use bodies::Bodies;
-pub use clock::Clock;
-pub use creases::{CREASE_ANGLE, Creased, inside_edges, split_at_creases};
-pub use curvature::{Curvature, EARTH_RADIUS, REFRACTION};
-pub use curve::along_curve;
-pub use directions::Weighting;
-pub use epw::{BadWeather, Record, Weather};
 pub use error::Error;
-pub use exposure::{sky_view, sun_hours};
-pub use field_horizon::FieldHorizonJob;
-pub use glb::write_glb;
-pub use groups::{Groups, Statistics};
-pub use height_field::HeightField;
-pub use horizon_angles::HorizonJob;
-pub use hourly::{Hourly, Receipt};
-pub use job::{Answers, Job, Key, run};
-pub use learn::{Learned, learn_when_it_pays};
-pub use measures::SunlightClass;
-pub use mesh::Mesh;
-pub use moment::{BadMoment, Moment, is_leap_year};
+pub use files::*;
+pub use jobs::*;
 pub use monitor::Monitor;
-pub use normals::vertex_normals;
-pub use npz::{Array, Entry, npz_bytes, write_npz};
-pub use occlusion_job::{OcclusionJob, Openness};
 pub use orientation::{Orientation, UpAxis};
-pub use part::{Identity, Part};
-pub use perez::{Irradiance, perez_sky};
-pub use placement::Placement;
-pub use ply::ShadedMesh;
-pub use sensors::{Grid, Label, Layout, Sensors};
-pub use sky::{SkyDivision, SkyPatches};
-pub use sun::{Place, Refraction, SunPosition, sun_positions};
-pub use sunlight::{SunFound, SunJob, SunValues, Sunlight, Suns, TimeStep};
-pub use surfaces::{Flat, Surface, Surfaces};
-pub use table::BadTable;
-pub use view_factors::{ViewFactorJob, view_factors};
-pub use viewshed::{Observer, ViewshedJob, Viewsheds};
-pub use visibility::{SightLines, SightRange, sees_directions, sees_each_other, sees_points};
-pub use visibility_job::{Eyes, VisibilityJob};
-pub use work::Work;
+pub use points::*;
+pub use rasters::*;
+pub use sight::*;
+pub use sun::*;

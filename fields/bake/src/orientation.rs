@@ -1,7 +1,7 @@
 //! Where up and north are in a scene.
 
 use crate::Error;
-use crate::normals::{cross, unit};
+use crate::vector::{cross, dot, unit};
 
 /// Axis of a scene that points up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -102,6 +102,13 @@ impl Orientation {
     }
 }
 
+/// Refuses azimuths that are not finite.
+pub(crate) fn check_azimuths(azimuths: &[f64]) -> Result<(), Error> {
+    let wanted = "a finite angle in degrees";
+    let mut azimuths = azimuths.iter();
+    azimuths.try_for_each(|&x| Error::check_range("azimuth", x, x.is_finite(), wanted))
+}
+
 /// Sine and cosine of an angle in degrees; exact at right angles.
 pub(crate) fn sin_cos_degrees(angle: f64) -> (f64, f64) {
     match angle.rem_euclid(360.0) {
@@ -112,11 +119,6 @@ pub(crate) fn sin_cos_degrees(angle: f64) -> (f64, f64) {
         // The system's own functions differ in their last bits.
         angle => libm::sincos(angle.to_radians()),
     }
-}
-
-/// Scalar product.
-pub(crate) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[cfg(test)]

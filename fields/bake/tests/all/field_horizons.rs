@@ -2,8 +2,8 @@
 
 use antumbra::{Bvh, Recipe};
 use antumbra_bake::{
-    Curvature, EARTH_RADIUS, FieldHorizonJob, HeightField, Job, Key, Observer, Orientation, Part,
-    REFRACTION, Work, run,
+    Curvature, EARTH_RADIUS, FieldHorizonJob, HeightField, Job as _, Key, Observer, Orientation,
+    Part, REFRACTION, Work, run,
 };
 use antumbra_raster::{Grid, Raster};
 use antumbra_testkit::Rng;
@@ -198,5 +198,5 @@ fn shares_have_the_bytes_of_the_whole() {
     }
     let bits = |angles: Vec<f32>| angles.into_iter().map(f32::to_bits).collect::<Vec<_>>();
     assert_eq!(bits(all.finish().expect("angles")), bits(whole));
-    assert_eq!(job.items(), 2000);
+    assert_eq!(job.size().items, 2000);
 }

@@ -123,7 +123,8 @@ fn report(
     let known = || values.iter().copied().filter(|value| !value.is_nan());
     let with_value = known().count();
     let without_value = values.len() - with_value;
-    let rays = job.rays_per_item() * with_value as u64;
+    let size = job.size();
+    let rays = size.rays * with_value as u64;
     let sum: f64 = known().map(f64::from).sum();
     let mean = (with_value > 0).then(|| sum / with_value as f64);
     let (min, max) = (known().reduce(f32::min), known().reduce(f32::max));
@@ -146,7 +147,7 @@ fn report(
         ("seed", &args.seed),
         ("vertices", &vertices),
         ("triangles", &ground.mesh.indices.len()),
-        ("points", &job.items()),
+        ("points", &size.items),
         ("without_value", &without_value),
         ("rays", &rays),
         ("mean", &mean),

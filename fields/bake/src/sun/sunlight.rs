@@ -1,0 +1,463 @@
+//! Sun and sky over a period of time: their steps, their light, and what sensors receive of it.
+
+use std::ops::Range;
+
+use antumbra::Bvh;
+use rayon::prelude::*;
+
+use crate::memory;
+use crate::points::curve::Places;
+use crate::vector::dot;
+use crate::{
+    Answers, BitMatrix, Clock, Error, Irradiance, Job, Key, Moment, Monitor, Orientation, Place,
+    Refraction, Size, SkyPatches, SunPosition, Weather, Weighting, ones, perez_sky,
+    sees_directions, sun_positions,
+};
+
+/// Most steps of time.
+const MOST_STEPS: f64 = 1e7;
+
+/// A step of time, with the irradiance of the sun and the sky.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimeStep {
+    /// Middle of the step in Unix time.
+    pub middle: f64,
+    /// Beginning of the step on local clocks.
+    pub begin: Moment,
+    /// Length of the step in hours.
+    pub hours: f64,
+    /// Mean irradiance over the step; 0 where nothing was measured.
+    pub irradiance: Irradiance,
+}
+
+impl TimeStep {
+    /// Steps of so many seconds between two moments on these clocks. The last one may be shorter.
+    ///
+    /// # Errors
+    /// [`Error::NoTime`] if the period ends before it begins, [`Error::Steps`] if there are more than ten million.
+    pub fn regular(
+        [from, to]: [Moment; 2],
+        clock: &Clock,
+        seconds: f64,
+    ) -> Result<Vec<Self>, Error> {
+        let [from, to] = [clock.unix(&from), clock.unix(&to)];
+        let count = ((to - from) / seconds - 1e-9).ceil();
+        if !(count >= 1.0) {
+            return Err(Error::NoTime);
+        }
+        if count > MOST_STEPS {
+            return Err(Error::Steps(count));
+        }
+        let step = |index| {
+            let begin = from + seconds * index as f64;
+            let length = seconds.min(to - begin);
+            Self {
+                middle: begin + 0.5 * length,
+                begin: clock.moment(begin),
+                hours: length / 3600.0,
+                irradiance: Irradiance::default(),
+            }
+        };
+        Ok((0..count as usize).map(step).collect())
+    }
+
+    /// A step of so many seconds around a moment on these clocks.
+    pub fn around(moment: Moment, clock: &Clock, seconds: f64) -> Self {
+        let middle = clock.unix(&moment);
+        Self {
+            middle,
+            begin: clock.moment(middle - 0.5 * seconds),
+            hours: seconds / 3600.0,
+            irradiance: Irradiance::default(),
+        }
+    }
+
+    /// Hour of the day in the middle of the step, from 0 to 24.
+    pub fn hour(&self) -> f64 {
+        (self.begin.seconds / 3600.0 + 0.5 * self.hours).rem_euclid(24.0)
+    }
+}
+
+impl Weather {
+    /// Steps of the records on clocks `zone` hours ahead of UTC: all steps, or the steps of a period. A period may run
+    /// over the end of the year. Its years do not count, because years of a typical year differ.
+    pub fn steps(&self, zone: f64, period: Option<[Moment; 2]>) -> Vec<TimeStep> {
+        let place = |moment: &Moment| (moment.month, moment.day, moment.seconds);
+        let is_in = |moment: &Moment| match &period {
+            Some([from, to]) if place(from) <= place(to) => {
+                place(from) <= place(moment) && place(moment) < place(to)
+            }
+            Some([from, to]) => place(from) <= place(moment) || place(moment) < place(to),
+            None => true,
+        };
+        let records = self.records.iter().filter(|record| is_in(&record.begin));
+        let step = |record: &crate::Record| TimeStep {
+            middle: record.begin.unix(zone) + 1800.0 * record.hours,
+            begin: record.begin,
+            hours: record.hours,
+            irradiance: record.irradiance,
+        };
+        records.map(step).collect()
+    }
+}
+
+/// Suns above the horizon, one for each step of time that has one.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Suns {
+    /// Middle of each step in Unix time.
+    pub times: Vec<f64>,
+    /// Position of each sun in the sky.
+    pub positions: Vec<SunPosition>,
+    /// Hours that each sun stands for.
+    pub hours: Vec<f64>,
+    /// Month of each sun, 0 to 11.
+    pub months: Vec<usize>,
+    /// Direct normal irradiation by each sun in Wh/m².
+    pub direct: Vec<f64>,
+    /// Months that have steps, with or without a sun.
+    pub covered: [bool; 12],
+}
+
+/// Sun and sky at a place over a period of time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sunlight {
+    /// Suns above the horizon.
+    pub suns: Suns,
+    /// Patches of the sky.
+    pub patches: SkyPatches,
+    /// Up and north of the scene.
+    pub orientation: Orientation,
+    /// Steps of time, each with the position of the sun, also below the horizon.
+    steps: Vec<(TimeStep, SunPosition)>,
+    /// Whether irradiance is known.
+    is_measured: bool,
+}
+
+impl Sunlight {
+    /// Sun and sky in the steps of time. `is_measured` says whether the steps have irradiance.
+    ///
+    /// # Errors
+    /// [`Error::Range`] if the place or a time is outside its range.
+    pub fn new(
+        place: &Place,
+        steps: Vec<TimeStep>,
+        is_measured: bool,
+        patches: SkyPatches,
+        orientation: Orientation,
+    ) -> Result<Self, Error> {
+        let times: Vec<f64> = steps.iter().map(|step| step.middle).collect();
+        let positions = sun_positions(place, Refraction::Standard, &times)?;
+        let steps: Vec<_> = steps.into_iter().zip(positions).collect();
+        let mut suns = Suns::default();
+        for (step, position) in &steps {
+            let month = step.begin.month as usize - 1;
+            suns.covered[month] = true;
+            if position.elevation > 0.0 {
+                suns.times.push(step.middle);
+                suns.positions.push(*position);
+                suns.hours.push(step.hours);
+                suns.months.push(month);
+                suns.direct.push(step.irradiance.direct_normal * step.hours);
+            }
+        }
+        Ok(Self {
+            suns,
+            patches,
+            orientation,
+            steps,
+            is_measured,
+        })
+    }
+
+    /// Number of steps of time, with and without a sun.
+    pub fn steps(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// Directions to the suns, `[suns, 3]`.
+    pub fn sun_directions(&self) -> Vec<[f32; 3]> {
+        let direction = |sun: &SunPosition| {
+            let direction = self.orientation.direction(sun.azimuth, sun.elevation);
+            direction.map(|x| x as f32)
+        };
+        self.suns.positions.iter().map(direction).collect()
+    }
+
+    /// Directions to the patches of the sky, `[patches, 3]`.
+    pub fn patch_directions(&self) -> Vec<[f32; 3]> {
+        self.patches.directions(&self.orientation)
+    }
+
+    /// Steps of time with their suns.
+    pub(crate) fn timeline(&self) -> &[(TimeStep, SunPosition)] {
+        &self.steps
+    }
+
+    /// Whether irradiance is known.
+    pub(crate) fn is_measured(&self) -> bool {
+        self.is_measured
+    }
+
+    /// Light of the sky, if irradiance is known.
+    fn sky(&self) -> Result<Option<SkyLight>, Error> {
+        if !self.is_measured {
+            return Ok(None);
+        }
+        let none = || vec![0.0; self.patches.len()];
+        let mut sky = SkyLight {
+            of_all: none(),
+            by_month: Default::default(),
+        };
+        for (step, sun) in &self.steps {
+            let of_month = &mut sky.by_month[step.begin.month as usize - 1];
+            if of_month.is_empty() {
+                *of_month = none();
+            }
+            if step.irradiance.diffuse_horizontal > 0.0 {
+                let day = step.begin.day_of_year();
+                let radiances = perez_sky(&self.patches, sun, day, &step.irradiance)?;
+                for sums in [&mut sky.of_all, of_month] {
+                    let pairs = sums.iter_mut().zip(&radiances);
+                    pairs.for_each(|(sum, radiance)| *sum += radiance * step.hours);
+                }
+            }
+        }
+        Ok(Some(sky))
+    }
+}
+
+/// Light from each patch of the sky, in Wh/(m² sr).
+struct SkyLight {
+    of_all: Vec<f64>,
+    /// Empty for months without steps.
+    by_month: [Vec<f64>; 12],
+}
+
+/// Hours, sky view and irradiation of sensors. Sensors without a normal of some length have the value NaN.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SunValues {
+    /// Hours of direct sun, `[n]`.
+    pub hours: Vec<f64>,
+    /// Hours of each month, `[n, 12]`.
+    pub by_month: Vec<f64>,
+    /// Sky view factors, `[n]`: see [`sky_view`](crate::sky_view).
+    pub sky_view: Vec<f64>,
+    /// Parts of the sky's solid angle that are seen, `[n]`.
+    pub sky_open: Vec<f64>,
+    /// Irradiation by the sun in kWh/m², `[n]`; empty where irradiance is not known, as are all below.
+    pub direct: Vec<f64>,
+    /// Irradiation by the sky in kWh/m², `[n]`.
+    pub diffuse: Vec<f64>,
+    /// Irradiation by the sun in each month, `[n, 12]`.
+    pub direct_by_month: Vec<f64>,
+    /// Irradiation by the sky in each month, `[n, 12]`.
+    pub diffuse_by_month: Vec<f64>,
+}
+
+impl SunValues {
+    /// Direct and diffuse irradiation together.
+    pub fn total(&self) -> Vec<f64> {
+        let pairs = self.direct.iter().zip(&self.diffuse);
+        pairs.map(|(direct, diffuse)| direct + diffuse).collect()
+    }
+
+    /// Values of sensors from the suns and patches that they see.
+    fn new(job: &SunJob<'_>, suns_seen: &BitMatrix, sky_seen: &BitMatrix) -> Result<Self, Error> {
+        let Sunlight {
+            suns,
+            patches,
+            orientation,
+            ..
+        } = job.sunlight;
+        let sky = job.sunlight.sky()?;
+        let to_suns = to_suns(suns);
+        let mut values = Self::default();
+        for (list, width) in values.lists(sky.is_some()) {
+            *list = memory::room("values", width * job.places.points.len())?;
+        }
+        for row in 0..job.places.points.len() {
+            let Some(normal) = facing(job.facing.get(row).copied(), orientation) else {
+                values.push_none(sky.is_some());
+                continue;
+            };
+            let (mut months, mut direct_months) = ([0.0; 12], [0.0; 12]);
+            let (mut hours, mut direct) = (0.0, 0.0);
+            for sun in ones(suns_seen.row(row)) {
+                hours += suns.hours[sun];
+                months[suns.months[sun]] += suns.hours[sun];
+                let beam = suns.direct[sun] * dot(normal, to_suns[sun]).max(0.0);
+                direct += beam;
+                direct_months[suns.months[sun]] += beam;
+            }
+            let seen = sky_seen.row(row);
+            values.hours.push(hours);
+            values.by_month.extend(months);
+            let view = patches.view(normal, Weighting::Cosine, seen);
+            values.sky_view.push(view);
+            let open = patches.view(normal, Weighting::Uniform, seen);
+            values.sky_open.push(open);
+            if let Some(sky) = &sky {
+                let diffuse = |sky: &Vec<f64>| match sky.is_empty() {
+                    true => 0.0,
+                    false => patches.irradiance(normal, sky, seen) / 1000.0,
+                };
+                values.direct.push(direct / 1000.0);
+                values.diffuse.push(diffuse(&sky.of_all));
+                let direct = direct_months.map(|direct| direct / 1000.0);
+                values.direct_by_month.extend(direct);
+                let diffuse = sky.by_month.iter().map(diffuse);
+                values.diffuse_by_month.extend(diffuse);
+            }
+        }
+        Ok(values)
+    }
+
+    /// Adds a sensor without values.
+    fn push_none(&mut self, is_measured: bool) {
+        for (list, width) in self.lists(is_measured) {
+            list.extend(std::iter::repeat_n(f64::NAN, width));
+        }
+    }
+
+    /// The lists, with their values per sensor.
+    fn lists(&mut self, is_measured: bool) -> Vec<(&mut Vec<f64>, usize)> {
+        let mut lists = vec![(&mut self.hours, 1), (&mut self.by_month, 12)];
+        lists.extend([(&mut self.sky_view, 1), (&mut self.sky_open, 1)]);
+        if is_measured {
+            lists.extend([(&mut self.direct, 1), (&mut self.direct_by_month, 12)]);
+            lists.extend([(&mut self.diffuse, 1), (&mut self.diffuse_by_month, 12)]);
+        }
+        lists
+    }
+}
+
+/// Directions to suns in terms of east, north and up.
+pub(crate) fn to_suns(suns: &Suns) -> Vec<[f64; 3]> {
+    let direction =
+        |sun: &SunPosition| Orientation::default().direction(sun.azimuth, sun.elevation);
+    suns.positions.iter().map(direction).collect()
+}
+
+/// Normal in terms of east, north and up, of length 1. Of points in free space, what falls on a level surface counts.
+pub(crate) fn facing(normal: Option<[f32; 3]>, orientation: &Orientation) -> Option<[f64; 3]> {
+    match normal {
+        None => Some([0.0, 0.0, 1.0]),
+        Some(normal) => unscaled_unit(orientation.local(normal.map(f64::from))),
+    }
+}
+
+/// The vector scaled to length 1, if it has a direction.
+fn unscaled_unit(vector: [f64; 3]) -> Option<[f64; 3]> {
+    let length = dot(vector, vector).sqrt();
+    (length > 0.0 && length.is_finite()).then(|| vector.map(|x| x / length))
+}
+
+/// Job of [`SunValues`]: which suns and patches of the sky sensors see.
+///
+/// Points, normals and visibility are as in [`sees_directions`]. Items are points along a curve, so that the items of a
+/// chunk are near each other.
+pub struct SunJob<'a> {
+    /// Normals as they were given.
+    facing: &'a [[f32; 3]],
+    places: Places,
+    sunlight: &'a Sunlight,
+    /// Directions to the suns, then to the patches.
+    directions: Vec<[f32; 3]>,
+}
+
+/// Result of a [`SunJob`].
+pub struct SunFound {
+    /// Suns that each sensor sees.
+    pub suns_seen: BitMatrix,
+    /// Patches that each sensor sees.
+    pub sky_seen: BitMatrix,
+    /// Sums over them.
+    pub values: SunValues,
+}
+
+impl<'a> SunJob<'a> {
+    /// The job of these sensors. `normals` are the normals of surfaces, or empty for points in free space.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if the lists differ in length, or [`Error::NoMemory`].
+    pub fn new(
+        points: &[[f32; 3]],
+        normals: &'a [[f32; 3]],
+        sunlight: &'a Sunlight,
+    ) -> Result<Self, Error> {
+        Ok(Self {
+            facing: normals,
+            places: Places::new(points, normals)?,
+            sunlight,
+            directions: [sunlight.sun_directions(), sunlight.patch_directions()].concat(),
+        })
+    }
+
+    /// Number of rays: one to each sun and patch above the plane of each sensor.
+    pub fn rays(&self) -> u64 {
+        if self.places.normals.is_empty() {
+            return self.places.points.len() as u64 * self.directions.len() as u64;
+        }
+        let above = |normal: &[f32; 3]| {
+            let normal = normal.map(f64::from);
+            let faces = |direction: &&[f32; 3]| dot(normal, direction.map(f64::from)) > 0.0;
+            self.directions.iter().filter(faces).count() as u64
+        };
+        self.places.normals.par_iter().map(above).sum()
+    }
+
+    /// Rows of bits as a matrix of suns and one of patches.
+    fn split(&self, words: &[u64]) -> Result<(BitMatrix, BitMatrix), Error> {
+        let (suns, patches) = (self.sunlight.suns.times.len(), self.sunlight.patches.len());
+        let mut suns_seen = BitMatrix::new(self.places.points.len(), suns)?;
+        let mut sky_seen = BitMatrix::new(self.places.points.len(), patches)?;
+        let per_row = (suns + patches).div_ceil(64).max(1);
+        for (row, words) in words.chunks_exact(per_row).enumerate() {
+            for column in ones(words) {
+                match column.checked_sub(suns) {
+                    None => suns_seen.set(row, column, true),
+                    Some(patch) if patch < patches => sky_seen.set(row, patch, true),
+                    Some(_) => return Err(Error::Answers),
+                }
+            }
+        }
+        Ok((suns_seen, sky_seen))
+    }
+}
+
+impl Job for SunJob<'_> {
+    type Found = SunFound;
+    type Number = u64;
+
+    const NAME: &'static str = "sun/3";
+
+    fn size(&self) -> Size {
+        let directions = self.directions.len();
+        let words = directions.div_ceil(64);
+        Size::each(self.places.points.len(), directions as u64, words)
+    }
+
+    fn places(&self) -> Option<&Places> {
+        Some(&self.places)
+    }
+
+    fn identify(&self, key: &mut Key) {
+        key.places(&self.places);
+        key.vectors(&self.directions);
+    }
+
+    fn answers(&self, bvh: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers<Self> {
+        let ([points, normals], far) = (self.places.at(items), f32::INFINITY);
+        let seen = sees_directions(bvh, points, normals, &self.directions, far, monitor)?;
+        Ok(seen.into_words())
+    }
+
+    fn found(&self, words: Vec<u64>) -> Result<SunFound, Error> {
+        let (suns_seen, sky_seen) = self.split(&words)?;
+        Ok(SunFound {
+            values: SunValues::new(self, &suns_seen, &sky_seen)?,
+            suns_seen,
+            sky_seen,
+        })
+    }
+}
