@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::io::Write as _;
 
+use antumbra_image::Rgb8Image;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use pdf_writer::types::{CidFontType, FontFlags, SystemInfo, UnicodeCmap};
@@ -129,58 +130,20 @@ impl Font {
 /// The bytes of a file.
 pub(crate) fn write(drawing: &Drawing) -> Result<Vec<u8>, Error> {
     let [catalogue, pages, page, contents, information] = [1, 2, 3, 4, 5].map(Ref::new);
-    let mut fonts = [Weight::Regular, Weight::Bold].map(Font::new);
-    let mut content = Content::new();
-    // From here on in pixels, with y downwards.
-    let height = POINT * drawing.height as f32;
-    content.transform([POINT, 0.0, 0.0, -POINT, 0.0, height]);
-    let mut pictures = Vec::new();
-    for item in &drawing.items {
-        match item {
-            Item::Polygon { corners, fill } => {
-                colour(&mut content, *fill);
-                polygon(&mut content, corners);
-                content.fill_nonzero();
-            }
-            Item::Outline {
-                corners,
-                colour,
-                width,
-            } => {
-                let [r, g, b] = colour.map(|x| f32::from(x) / 255.0);
-                content.set_stroke_rgb(r, g, b).set_line_width(*width);
-                polygon(&mut content, corners);
-                content.stroke();
-            }
-            Item::Text(text) => {
-                let font = match text.weight {
-                    Weight::Regular => &mut fonts[0],
-                    Weight::Bold => &mut fonts[1],
-                };
-                self::text(&mut content, text, font);
-            }
-            Item::Picture { image, at, size } => {
-                let name = format!("P{}", pictures.len());
-                // A picture is a square of size 1 with its top at 1.
-                content
-                    .save_state()
-                    .transform([size[0], 0.0, 0.0, -size[1], at[0], at[1] + size[1]])
-                    .x_object(Name(name.as_bytes()))
-                    .restore_state();
-                pictures.push((name, image));
-            }
-        }
-    }
-
+    let picture = |index: usize| Ref::new(BEFORE_PICTURES + 1 + index as i32);
+    let [width, height] = [drawing.width, drawing.height].map(|side| POINT * side as f32);
+    let Painted {
+        content,
+        fonts,
+        pictures,
+    } = Painted::new(drawing, height);
     let mut pdf = Pdf::new();
     pdf.catalog(catalogue).pages(pages);
     pdf.pages(pages).kids([page]).count(1);
     pdf.document_info(information)
         .title(TextStr(&drawing.title))
         .producer(TextStr("Antumbra"));
-    let picture = |index: usize| Ref::new(BEFORE_PICTURES + 1 + index as i32);
     let mut sheet = pdf.page(page);
-    let width = POINT * drawing.width as f32;
     sheet.media_box(Rect::new(0.0, 0.0, width, height));
     sheet.parent(pages).contents(contents);
     let mut resources = sheet.resources();
@@ -189,20 +152,16 @@ pub(crate) fn write(drawing: &Drawing) -> Result<Vec<u8>, Error> {
         known.pair(Name(name.as_bytes()), picture(index));
     }
     known.finish();
-    let used = || {
-        fonts
-            .iter()
-            .zip([6, 11])
-            .filter(|(font, _)| !font.letters.is_empty())
-    };
+    let used = fonts.iter().zip([6, 11]);
+    let used = used.filter(|(font, _)| !font.letters.is_empty());
     let mut known = resources.fonts();
-    for (font, first) in used() {
+    for (font, first) in used.clone() {
         known.pair(font.name(), Ref::new(first));
     }
     known.finish();
     resources.finish();
     sheet.finish();
-    for (font, first) in used() {
+    for (font, first) in used {
         font.write(&mut pdf, first)?;
     }
     for (index, (_, image)) in pictures.iter().enumerate() {
@@ -218,6 +177,69 @@ pub(crate) fn write(drawing: &Drawing) -> Result<Vec<u8>, Error> {
     pdf.stream(contents, &compressed(&content.finish())?)
         .filter(Filter::FlateDecode);
     Ok(pdf.finish())
+}
+
+/// The items of a drawing as operators of a page, with what they use.
+struct Painted<'a> {
+    content: Content,
+    fonts: [Font; 2],
+    /// Names of pictures.
+    pictures: Vec<(String, &'a Rgb8Image)>,
+}
+
+impl<'a> Painted<'a> {
+    /// Paints all items on a page of some height in points.
+    fn new(drawing: &'a Drawing, height: f32) -> Self {
+        let mut painted = Self {
+            content: Content::new(),
+            fonts: [Weight::Regular, Weight::Bold].map(Font::new),
+            pictures: Vec::new(),
+        };
+        // From here on in pixels, with y downwards.
+        let content = &mut painted.content;
+        content.transform([POINT, 0.0, 0.0, -POINT, 0.0, height]);
+        drawing.items.iter().for_each(|item| painted.add(item));
+        painted
+    }
+
+    fn add(&mut self, item: &'a Item) {
+        let content = &mut self.content;
+        match item {
+            Item::Polygon { corners, fill } => {
+                colour(content, *fill);
+                polygon(content, corners);
+                content.fill_nonzero();
+            }
+            Item::Outline {
+                corners,
+                colour,
+                width,
+            } => {
+                let [r, g, b] = colour.map(|x| f32::from(x) / 255.0);
+                content.set_stroke_rgb(r, g, b).set_line_width(*width);
+                polygon(content, corners);
+                content.stroke();
+            }
+            Item::Text(found) => {
+                let [regular, bold] = &mut self.fonts;
+                let font = match found.weight {
+                    Weight::Regular => regular,
+                    Weight::Bold => bold,
+                };
+                text(content, found, font);
+            }
+            Item::Picture { image, at, size } => {
+                let name = format!("P{}", self.pictures.len());
+                // A picture is a square of size 1 with its top at 1.
+                content
+                    .save_state()
+                    .transform([size[0], 0.0, 0.0, -size[1], at[0], at[1] + size[1]])
+                    .x_object(Name(name.as_bytes()))
+                    .restore_state();
+                self.pictures.push((name, image));
+            }
+        }
+    }
 }
 
 fn colour(content: &mut Content, colour: Colour) {
