@@ -5,9 +5,8 @@
 //! standard output.
 //!
 //! - `args/`: commands and flags, each defined once with its help
-//! - `render`, `view`, `merge`, `farm/`, `study`, `bench`, `bake/`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
-//! - `scenes`: scenes that the command line names;  `checkpoint`, `looks`: what is kept and shown of a
-//!   rendering while it lasts
+//! - `render/`, `view`, `merge`, `farm/`, `study`, `bench`, `bake/`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
+//! - `scenes`: scenes that the command line names
 //! - `table`, `json`, `output`: results as text, JSON and files;  `archive`: files of this program's own kinds
 //! - `version`, `progress/`, `interrupt`, `exit`: what this program is, how far it is, how it ends
 #![forbid(unsafe_code)]
@@ -16,7 +15,6 @@ mod archive;
 mod args;
 mod bake;
 mod bench;
-mod checkpoint;
 mod demo;
 mod exit;
 mod farm;
@@ -25,9 +23,7 @@ mod info;
 mod input;
 mod interrupt;
 mod json;
-mod layers;
 mod list;
-mod looks;
 mod man;
 mod merge;
 mod output;
@@ -36,7 +32,6 @@ mod render;
 mod scenes;
 mod study;
 mod table;
-mod until;
 mod version;
 mod view;
 
@@ -81,7 +76,7 @@ fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Some(Command::Farm(command)) => farm::run(&command),
         Some(Command::Study(args)) => study::run(&args, memory),
         Some(Command::Bench(args)) => bench::run(&args, memory),
-        Some(Command::Bake(bake)) => bake::run(&bake, memory, None),
+        Some(Command::Bake(command)) => bake::run(command.args().0, memory, None),
         Some(Command::Info(args)) => info::run(&args, memory),
         Some(Command::Image(command)) => return image_tools::run(&command),
         Some(Command::List(args)) => list::run(&args),

@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::args::{MergeArgs, usual};
 use crate::bake::{self, chunks::is_part};
 use crate::exit::{Failure, tell};
+use crate::json::Destination;
 use crate::output::Files;
 use crate::render::{check_image_names, hash_text};
 use crate::version::VERSION;
@@ -23,21 +24,16 @@ pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
         return Err(Failure::Usage("--output: a picture is one file".into()));
     };
     if args.lines.is_some() {
-        let reason = "--lines: a picture has no lines of sight";
-        return Err(Failure::Usage(reason.into()));
+        return Err(Failure::usage("--lines: a picture has no lines of sight"));
     }
     check_image_names(Some(output), args.stderr_image.as_deref())?;
     let mut files = Files::default();
-    files.writes("--output", output)?;
-    if let Some(path) = &args.stderr_image {
-        files.writes("--stderr-image", path)?;
-    }
-    if let Some(json) = &args.json {
-        files.writes("--json", json.path())?;
-    }
-    for part in &args.parts {
-        files.reads("the part", part)?;
-    }
+    files.writes_some([
+        ("--output", Some(&**output)),
+        ("--stderr-image", args.stderr_image.as_deref()),
+        ("--json", args.json.as_ref().map(Destination::path)),
+    ])?;
+    files.reads_some(args.parts.iter().map(|part| ("the part", Some(&**part))))?;
     files.check()?;
     let mut parts = Vec::with_capacity(args.parts.len());
     for path in &args.parts {
@@ -58,8 +54,9 @@ pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
     let image = whole.image()?;
     let errors = whole.standard_error()?;
     if args.stderr_image.is_some() && errors.is_none() {
-        let reason = "the parts were rendered without --stderr-image";
-        return Err(Failure::Usage(reason.into()));
+        return Err(Failure::usage(
+            "the parts were rendered without --stderr-image",
+        ));
     }
     let _writing = interrupt::writing();
     image.write_for(output, &usual(identity.is_light()))?;

@@ -91,6 +91,31 @@ impl Files {
         Ok(())
     }
 
+    /// Notes outputs by their flags, as far as they are given.
+    ///
+    /// # Errors
+    /// As [`Files::writes`].
+    pub fn writes_some<'a>(
+        &mut self,
+        outputs: impl IntoIterator<Item = (&'a str, Option<&'a Path>)>,
+    ) -> Result<(), Failure> {
+        let mut outputs = outputs.into_iter();
+        outputs
+            .try_for_each(|(purpose, path)| path.map_or(Ok(()), |path| self.writes(purpose, path)))
+    }
+
+    /// Notes inputs by their purposes, as far as they are given.
+    ///
+    /// # Errors
+    /// As [`Files::reads`].
+    pub fn reads_some<'a>(
+        &mut self,
+        inputs: impl IntoIterator<Item = (&'a str, Option<&'a Path>)>,
+    ) -> Result<(), Failure> {
+        let mut inputs = inputs.into_iter();
+        inputs.try_for_each(|(purpose, path)| path.map_or(Ok(()), |path| self.reads(purpose, path)))
+    }
+
     /// Notes that files may be written in a directory, under names that `ours` accepts.
     ///
     /// # Errors
@@ -224,6 +249,11 @@ pub fn beside(output: &Path, suffix: &str) -> Option<PathBuf> {
     let mut name = output.as_os_str().to_owned();
     name.push(suffix);
     Some(name.into())
+}
+
+/// Where the checkpoint of an output lies. Streams have none.
+pub fn checkpoint(output: &Path) -> Option<PathBuf> {
+    beside(output, ".checkpoint")
 }
 
 /// Refuses to replace a file that the command line does not name, unless this program wrote it. `remedy` is what helps then.

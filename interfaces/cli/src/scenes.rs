@@ -213,21 +213,8 @@ pub fn load_all(
     Ok(all)
 }
 
-/// Reads one scene, and applies what the command line says about its picture.
-pub fn load_one(
-    name: &PathBuf,
-    args: &PictureArgs,
-    max_memory: MemorySize,
-) -> Result<Loaded, Failure> {
-    let loaded = load_all(std::slice::from_ref(name), args, max_memory)?;
-    loaded
-        .into_iter()
-        .next()
-        .ok_or_else(|| Failure::work("no scene"))
-}
-
 /// Applies what the command line says about camera, film and light, and says what was read.
-pub fn apply_camera(loaded: &mut Loaded, args: &CameraArgs) -> Result<(), Failure> {
+fn apply_camera(loaded: &mut Loaded, args: &CameraArgs) -> Result<(), Failure> {
     let asked = [
         ("--environment", args.environment.is_some()),
         ("--sun", args.sun.is_some()),
@@ -261,6 +248,20 @@ pub fn apply_camera(loaded: &mut Loaded, args: &CameraArgs) -> Result<(), Failur
         antumbra_load::set_ground(&mut loaded.scene, up);
     }
     Ok(())
+}
+
+/// Reads one scene, and applies what the command line says about its picture, camera, film and light.
+pub fn load_picture(
+    name: &PathBuf,
+    picture: &PictureArgs,
+    camera: &CameraArgs,
+    max_memory: MemorySize,
+) -> Result<Loaded, Failure> {
+    let all = load_all(std::slice::from_ref(name), picture, max_memory)?;
+    let loaded = all.into_iter().next();
+    let mut loaded = loaded.ok_or_else(|| Failure::work("no scene"))?;
+    apply_camera(&mut loaded, camera)?;
+    Ok(loaded)
 }
 
 /// Applies what the command line says about the camera.

@@ -52,8 +52,7 @@ fn ready(
     memory: MemorySize,
     server: &Server,
 ) -> Result<(Scene, World, Option<SunDay>), Failure> {
-    let mut loaded = scenes::load_one(&args.scene, &args.picture, memory)?;
-    scenes::apply_camera(&mut loaded, &args.camera)?;
+    let loaded = scenes::load_picture(&args.scene, &args.picture, &args.camera, memory)?;
     let day = args.day.map(|date| sun_day(args, &date, &loaded));
     let day = day.transpose()?;
     let scene = loaded.scene;

@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 
 use super::{SCENE, SCENE_LONG, heading};
+use crate::bake::BakeCommand;
 
 /// Commands of `farm`.
 #[derive(Debug, Subcommand)]
@@ -22,8 +24,13 @@ pub enum FarmCommand {
     Openjd(OpenjdArgs),
 }
 
+/// What machines share if nothing else is said.
+const PICTURE: &str = "render";
+
 /// Commands that many machines can share.
-const JOBS: [&str; 6] = ["render", "ao", "sun", "visible", "horizon", "factors"];
+fn jobs() -> Vec<&'static str> {
+    [&[PICTURE], BakeCommand::NAMES].concat()
+}
 
 /// Flags of everything that renders on many machines.
 #[derive(Debug, Args)]
@@ -40,8 +47,7 @@ pub struct FarmArgs {
     /// As --lines of visible: a .csv of pairs, or a .ply of edges. The last task writes them.
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub lines: Option<PathBuf>,
-    /// ao, sun, visible, horizon, factors
-    #[arg(long = "command", value_name = "COMMAND", value_parser = JOBS, default_value = JOBS[0], hide_possible_values = true, help_heading = heading::JOB)]
+    #[arg(long = "command", help = BakeCommand::NAMES.join(", "), value_name = "COMMAND", value_parser = PossibleValuesParser::new(jobs()), default_value = PICTURE, hide_possible_values = true, help_heading = heading::JOB)]
     pub job: String,
     /// Standard error of every pixel's mean, as .exr
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]

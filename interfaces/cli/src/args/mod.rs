@@ -1,22 +1,17 @@
 //! Commands and flags, each defined once together with its help.
 //!
-//! - `render`, `view`, `merge`, `farm`, `study`, `bench`, `ao`, `sun`, `visible`, `horizon`, `factors`, `info`, `image`, `list`, `man`: the flags of one
-//!   command each
-//! - `bakes`: the commands that bake, in one list
+//! - `render`, `view`, `merge`, `farm`, `study`, `bench`, `info`, `image`, `list`, `man`: the flags of one command each; commands
+//!   that bake have theirs in [`bake`](crate::bake)
 //! - `camera`: flags about camera, film and light
 //! - `picture`, `tree`, `display`, `machine`, `map`, `chunks`: flags that several commands have
 //! - `slips`: better words about mistakes
 //! - `values`: what flags may be set to;  `names`: names of orders, builders and so on, from the kernel's lists
 
-mod ao;
-mod bakes;
 mod bench;
 mod camera;
 mod chunks;
 mod display;
-mod factors;
 mod farm;
-mod horizon;
 mod image;
 mod info;
 mod list;
@@ -31,29 +26,23 @@ mod render;
 mod sensors;
 mod slips;
 mod study;
-mod sun;
 mod times;
 mod tree;
-mod values;
+pub mod values;
 mod view;
-mod visible;
 
 use clap::{Parser, Subcommand};
 
 use antumbra_load::MemorySize;
 
+use crate::bake::BakeCommand;
 use crate::version;
 
-pub use ao::AoArgs;
-pub use bakes::BakeCommand;
-pub(crate) use bakes::of_bake;
 pub use bench::BenchArgs;
 pub use camera::{CameraArgs, PoseArgs};
 pub use chunks::ChunkArgs;
 pub use display::{AovNames, DisplayArgs, is_for_displays, usual};
-pub use factors::FactorArgs;
 pub use farm::{FarmArgs, FarmCommand, OpenjdArgs, SlurmArgs};
-pub use horizon::HorizonArgs;
 pub use image::{CompareArgs, ImageCommand};
 pub use info::InfoArgs;
 pub use list::{ListArgs, ListName};
@@ -64,17 +53,15 @@ pub use merge::MergeArgs;
 pub use picture::PictureArgs;
 pub use raster::RasterArgs;
 pub use render::{RenderArgs, UntilArgs};
-pub use sensors::{NorthArgs, PlaceArgs, UnitArgs};
+pub use sensors::{NorthArgs, PlaceArgs, UnitArgs, up_axis};
 pub use slips::parse;
 pub use study::StudyArgs;
-pub use sun::{By, Shown, SunArgs};
 pub use times::TimeArgs;
-pub use values::CameraChoice;
+pub use values::{CameraChoice, Resolution};
 pub use view::ViewArgs;
-pub use visible::VisibleArgs;
 
 /// Headings of groups of flags.
-mod heading {
+pub mod heading {
     pub const PICTURE: &str = "Picture";
     pub const OUTPUT: &str = "Output";
     pub const CAMERA: &str = "Camera and film";
@@ -90,8 +77,8 @@ mod heading {
 }
 
 /// Help of every argument that is a scene.
-const SCENE: &str = "Scene file, - or builtin:NAME[:TRIANGLES]";
-const SCENE_LONG: &str = "\
+pub const SCENE: &str = "Scene file, - or builtin:NAME[:TRIANGLES]";
+pub const SCENE_LONG: &str = "\
 Scene: a .pbrt file, a mesh (.ply, .obj, .stl, .gltf or .glb, with its materials, shown under a clear sky unless it \
 has lights), a height raster (.tif, .asc or .npy), or a built-in scene as builtin:NAME[:TRIANGLES], such as builtin:city or builtin:city:20000. - reads a \
 .pbrt file from the standard input";

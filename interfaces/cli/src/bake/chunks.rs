@@ -14,7 +14,7 @@ use crate::args::ChunkArgs;
 use crate::exit::{Failure, say, tell};
 use crate::output::{self, Files};
 use crate::progress::Progress;
-use crate::{archive, checkpoint, interrupt};
+use crate::{archive, interrupt};
 
 /// Extension of shards.
 const PART: &str = "part";
@@ -70,7 +70,7 @@ pub fn declare(
                 "{path}: a shard is written as one .{PART}, for merge"
             )));
         }
-    } else if let Some(path) = checkpoint::beside(first) {
+    } else if let Some(path) = output::checkpoint(first) {
         files.writes("the checkpoint", &path)?;
         if path.exists() && !is_part(&path) {
             return Err(Failure::Data(format!(
@@ -113,7 +113,7 @@ pub fn compute<J: Job>(
 ) -> Result<Option<PathBuf>, Failure> {
     let path = match args.shard {
         Some(_) => Some(output.to_path_buf()),
-        None => checkpoint::beside(output),
+        None => output::checkpoint(output),
     };
     let mut keeper = Keeper {
         path,

@@ -13,15 +13,16 @@ use super::chunks::{self, PartFile};
 use super::ground::Ground;
 use super::map;
 use super::terrain::Terrain;
-use crate::args::{BakeCommand, ChunkArgs, VisibleArgs, of_bake};
+use super::visible::VisibleArgs;
+use crate::args::ChunkArgs;
 use crate::exit::{Failure, tell};
 use crate::json::Destination;
 use crate::output::Files;
 use crate::progress::Progress;
 use crate::{input, json, scenes, version};
 
-/// What a command has of its own.
-pub trait Baking {
+/// What a command has of its own. It has the arguments of all bakes, [`Shared`], and more.
+pub trait Baking: Shared {
     /// Refuses outputs that cannot be made, before anything is read.
     fn check(&self) -> Result<(), Failure>;
 
@@ -32,37 +33,94 @@ pub trait Baking {
     fn files(&self) -> [Vec<Named<'_>>; 2] {
         Default::default()
     }
+
+    /// Whether the only output is a mesh or a picture, which flags make out of what a share computes. Pictures are no maps.
+    fn is_picture(&self) -> bool {
+        false
+    }
+
+    /// Where lines of sight go, for a command that has them.
+    fn lines(&mut self) -> Option<&mut Option<PathBuf>> {
+        None
+    }
 }
+
+/// Arguments of all bakes. [`bakes`] implements it.
+pub trait Shared {
+    /// Scene, outputs, document, and flags about chunks.
+    fn shared(&self) -> (&Path, &[PathBuf], Option<&Destination>, &ChunkArgs);
+
+    /// Wants the whole as these outputs and this document.
+    fn want(&mut self, outputs: &[PathBuf], json: Option<&Destination>);
+}
+
+/// Defines the list of commands: a name, a variant, and arguments that have the fields `scene`, `output`, `json` and `chunks`.
+macro_rules! bakes {
+    ($($(#[$attribute:meta])* $name:literal $kind:ident($args:ty),)*) => {
+        /// A command that bakes.
+        #[derive(Debug, clap::Subcommand)]
+        pub enum BakeCommand {
+            $($(#[$attribute])* #[command(name = $name)] $kind(Box<$args>),)*
+        }
+
+        impl BakeCommand {
+            /// Names of all commands.
+            pub const NAMES: &[&str] = &[$($name),*];
+
+            /// Arguments of the command, and its name.
+            pub fn args(&self) -> (&dyn command::Baking, &'static str) {
+                match self { $(Self::$kind(args) => (&**args, $name),)* }
+            }
+
+            /// Arguments of the command.
+            pub fn args_mut(&mut self) -> &mut dyn command::Baking {
+                match self { $(Self::$kind(args) => &mut **args,)* }
+            }
+        }
+
+        $(impl command::Shared for $args {
+            fn shared(&self) -> (&Path, &[PathBuf], Option<&Destination>, &ChunkArgs) {
+                (&self.scene, &self.output, self.json.as_ref(), &self.chunks)
+            }
+
+            fn want(&mut self, outputs: &[PathBuf], json: Option<&Destination>) {
+                (self.output, self.json) = (outputs.to_vec(), json.cloned());
+                self.chunks.shard = None;
+            }
+        })*
+    };
+}
+pub(super) use bakes;
 
 /// Runs a command, or merges parts of it.
 pub fn run(
-    command: &BakeCommand,
+    args: &dyn Baking,
     memory: MemorySize,
     parts: Option<&[PartFile]>,
 ) -> Result<(), Failure> {
-    of_bake!(command, args => {
-        let isa = args.chunks.machine.isa()?;
-        let is_ao = matches!(command, BakeCommand::Ao(_));
-        // What a share of ambient occlusion is of depends on its flags.
-        if args.chunks.shard.is_none() || is_ao {
-            args.check()?;
-        }
-        let bake = Bake {
-            scene: &args.scene,
-            outputs: &args.output,
-            json: args.json.as_ref(),
-            chunks: &args.chunks,
-            isa,
-            memory,
-            parts,
-        };
-        // Pictures of ambient occlusion are no maps.
-        let maps = if is_ao { &[] } else { bake.outputs };
-        let world_files = map::world_files(maps)?;
-        let [mut written, read] = args.files();
-        written.extend(world_files.iter().map(|path| ("the world file", Some(&**path))));
-        args.bake(&bake, bake.declare([written, read])?)
-    })
+    let (scene, outputs, json, chunks) = args.shared();
+    let isa = chunks.machine.isa()?;
+    if chunks.shard.is_none() || args.is_picture() {
+        args.check()?;
+    }
+    let bake = Bake {
+        scene,
+        outputs,
+        json,
+        chunks,
+        isa,
+        memory,
+        parts,
+    };
+    let maps = if args.is_picture() { &[] } else { outputs };
+    let world_files = map::world_files(maps)?;
+    let [mut written, read] = args.files();
+    written.extend(
+        world_files
+            .iter()
+            .map(|path| ("the world file", Some(&**path))),
+    );
+    args.bake(&bake, bake.declare([written, read])?)
 }
 
 /// Arguments that all bakes have.
@@ -123,15 +181,11 @@ impl Bake<'_> {
         let mut files = Files::default();
         chunks::declare(self.outputs, self.chunks.shard, &mut files)?;
         let json = ("--json", self.json.map(Destination::path));
-        for (purpose, path) in written.into_iter().chain([json]) {
-            path.map_or(Ok(()), |path| files.writes(purpose, path))?;
-        }
+        files.writes_some(written.into_iter().chain([json]))?;
         let parts = self.parts.unwrap_or_default().iter();
         let parts = parts.map(|file| ("the part", Some(&*file.path)));
         let scene = ("the scene", Some(self.scene));
-        for (purpose, path) in parts.chain([scene]).chain(read) {
-            path.map_or(Ok(()), |path| files.reads(purpose, path))?;
-        }
+        files.reads_some(parts.chain([scene]).chain(read))?;
         files.check()?;
         Ok(files)
     }

@@ -17,7 +17,7 @@ use antumbra_render::World;
 use antumbra_scene::{Geometry, Scene, Shape, TriangleMesh};
 
 use super::parts::Parts;
-use crate::args::VisibleArgs;
+use super::visible::VisibleArgs;
 use crate::exit::{Failure, say, tell};
 use crate::output::Files;
 use crate::{input, interrupt, scenes};
@@ -288,12 +288,16 @@ fn mesh(scene: &Scene, creases: bool) -> Result<(Mesh, usize), Failure> {
     }
     // Indices of PLY files are signed.
     if all.positions.len() > i32::MAX as usize {
-        let reason = "it has more vertices than a PLY file can hold";
-        return Err(Failure::scene(&scene.name, reason));
+        return Err(Failure::scene(
+            &scene.name,
+            "it has more vertices than a PLY file can hold",
+        ));
     }
     if all.positions.is_empty() {
-        let reason = "it has no mesh, so no vertices";
-        return Err(Failure::scene(&scene.name, reason));
+        return Err(Failure::scene(
+            &scene.name,
+            "it has no mesh, so no vertices",
+        ));
     }
     // Said once, where the scene is read.
     for (number, kind) in [(spheres, "spheres"), (curves, "curves")] {

@@ -4,15 +4,16 @@ use antumbra_load::MemorySize;
 use clap::Parser;
 
 use super::chunks::PartFile;
-use crate::args::{BakeCommand, Cli, Command, MergeArgs, of_bake};
+use crate::args::{Cli, Command, MergeArgs};
 use crate::exit::Failure;
 
 /// Joins parts, and writes what the command would have written without `--shard`. Outputs are named by the command line only:
 /// a part may come from somebody else.
 pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
     if args.stderr_image.is_some() {
-        let reason = "--stderr-image: these are no parts of a picture";
-        return Err(Failure::Usage(reason.into()));
+        return Err(Failure::usage(
+            "--stderr-image: these are no parts of a picture",
+        ));
     }
     let parts = read(args)?;
     let Some(first) = parts.first() else {
@@ -24,23 +25,23 @@ pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
     let Some(Command::Bake(mut bake)) = cli.command else {
         return Err(Failure::Data(format!("{name}: it was made by no bake")));
     };
-    match &mut bake {
-        BakeCommand::Visible(visible) => visible.lines.clone_from(&args.lines),
-        _ if args.lines.is_some() => {
-            let reason = "--lines: only parts of visible have lines of sight";
-            return Err(Failure::Usage(reason.into()));
+    match bake.args_mut().lines() {
+        Some(lines) => lines.clone_from(&args.lines),
+        None if args.lines.is_some() => {
+            return Err(Failure::usage(
+                "--lines: only parts of visible have lines of sight",
+            ));
         }
-        BakeCommand::Ao(_) if args.output.len() != 1 => {
-            return Err(Failure::Usage("--output: ao writes one file".into()));
-        }
-        _ => {}
+        None => {}
     }
-    of_bake!(&mut bake, bake => {
-        bake.chunks.shard = None;
-        bake.output.clone_from(&args.output);
-        bake.json.clone_from(&args.json);
-    });
-    super::run(&bake, memory, Some(&parts))
+    let (baking, name) = bake.args();
+    if baking.is_picture() && args.output.len() != 1 {
+        return Err(Failure::usage(format_args!(
+            "--output: {name} writes one file"
+        )));
+    }
+    bake.args_mut().want(&args.output, args.json.as_ref());
+    super::run(bake.args().0, memory, Some(&parts))
 }
 
 /// Reads the parts: no share may be there twice.

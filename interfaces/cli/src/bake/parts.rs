@@ -1,10 +1,14 @@
-//! Names of the triangles of a scene: objects and materials.
+//! Names of the triangles of a scene, objects and materials, and groups by them.
 
 use std::collections::{BTreeSet, HashMap};
 
-use antumbra_bake::Mesh;
+use antumbra_bake::{Groups, Mesh, Orientation};
 use antumbra_load::{Names, Part};
 use antumbra_scene::{Geometry, Scene};
+use clap::ValueEnum;
+
+use super::ground::Ground;
+use crate::exit::Failure;
 
 /// Names of all triangles of a scene without instances, in the order of its mesh.
 pub struct Parts {
@@ -111,5 +115,45 @@ impl Objects<'_> {
         let names = self.parts.runs.iter().map(|(_, part)| &part.object);
         let names: BTreeSet<&String> = names.filter(|name| !name.is_empty()).collect();
         names.into_iter().take(count).cloned().collect()
+    }
+}
+
+/// What groups of sensors have in common.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum By {
+    /// Objects, or bodies that touch
+    Object,
+    /// Materials
+    Material,
+    /// Sides of objects
+    Facade,
+}
+
+impl By {
+    /// Groups of the triangles of a scene whose surfaces are known. `compass` says where its north is.
+    pub fn groups(self, ground: &Ground, compass: &Orientation) -> Result<Groups, Failure> {
+        let (mesh, parts) = (&ground.mesh, &ground.parts);
+        match self {
+            Self::Material if !parts.has_materials() => {
+                let reason = "--by material: no material of the scene has a name";
+                Err(Failure::scene(&ground.loaded.scene.name, reason))
+            }
+            Self::Material => Ok(Groups::new(mesh, vec!["material"], |triangle| {
+                let part = parts.part(triangle);
+                vec![part.map_or_else(String::new, |part| part.material.clone())]
+            })),
+            Self::Object => {
+                let objects = parts.objects(mesh);
+                let name = |triangle| vec![objects.name(triangle)];
+                Ok(Groups::new(mesh, vec!["object"], name))
+            }
+            Self::Facade => {
+                let objects = parts.objects(mesh);
+                let sides = mesh.sides(ground.kinds(), compass);
+                let name =
+                    |triangle: usize| vec![objects.name(triangle), sides[triangle].to_owned()];
+                Ok(Groups::new(mesh, vec!["object", "facade"], name))
+            }
+        }
     }
 }

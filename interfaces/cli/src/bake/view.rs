@@ -60,8 +60,7 @@ impl View {
             }
         }
         if view.points.is_empty() {
-            let reason = "the camera sees no surface";
-            return Err(Failure::scene(&scene.name, reason));
+            return Err(Failure::scene(&scene.name, "the camera sees no surface"));
         }
         Ok(view)
     }

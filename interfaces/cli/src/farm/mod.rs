@@ -15,8 +15,7 @@ use std::path::{Path, PathBuf};
 use clap::Parser;
 use serde::{Deserialize, Serialize};
 
-use crate::args::{Cli, Command, FarmArgs, FarmCommand, of_bake};
-use crate::bake::Baking as _;
+use crate::args::{Cli, Command, FarmArgs, FarmCommand};
 use crate::exit::Failure;
 use crate::output::{self, Files};
 use crate::render::check_image_names;
@@ -62,16 +61,14 @@ impl Plan {
         let Some((output, more)) = args.output.split_first() else {
             return Err(Failure::Usage("--output is missing".into()));
         };
-        if args.lines.is_some() && args.job != "visible" {
-            let reason = "--lines: only visible has lines of sight";
-            return Err(Failure::Usage(reason.into()));
-        }
         match &*args.job {
             "render" => {
+                if args.lines.is_some() {
+                    return Err(no_lines());
+                }
                 check_image_names(Some(output), args.stderr_image.as_deref())?;
                 if !more.is_empty() {
-                    let reason = "--output: render writes one image";
-                    return Err(Failure::Usage(reason.into()));
+                    return Err(Failure::usage("--output: render writes one image"));
                 }
                 check_flags(args)?;
             }
@@ -119,20 +116,19 @@ impl Plan {
     fn check_files(&self, template: Option<&Path>) -> Result<(), Failure> {
         let mut files = Files::default();
         files.reads("the scene", Path::new(&self.scene))?;
-        files.writes("--output", Path::new(&self.output))?;
-        for path in &self.more_outputs {
-            files.writes("--output", Path::new(path))?;
-        }
-        if let Some(path) = &self.stderr_image {
-            files.writes("--stderr-image", Path::new(path))?;
-        }
-        if let Some(path) = &self.lines {
-            files.writes("--lines", Path::new(path))?;
-        }
-        if let Some(path) = template {
-            files.writes("--template", path)?;
-            output::check_file(path)?;
-        }
+        let outputs = self.outputs();
+        let outputs = outputs
+            .iter()
+            .map(|path| ("--output", Some(Path::new(path))));
+        files.writes_some(outputs.chain([
+            (
+                "--stderr-image",
+                self.stderr_image.as_deref().map(Path::new),
+            ),
+            ("--lines", self.lines.as_deref().map(Path::new)),
+            ("--template", template),
+        ]))?;
+        template.map_or(Ok(()), output::check_file)?;
         let images = [Some(&self.output), self.stderr_image.as_ref()];
         for path in images.into_iter().flatten().map(Path::new) {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -207,8 +203,9 @@ impl Plan {
 /// Refuses arguments that the command of a bake does not know or that cannot make the outputs, before a hundred machines do.
 fn check_bake(args: &FarmArgs) -> Result<(), Failure> {
     if args.stderr_image.is_some() {
-        let reason = "--stderr-image: only pictures have standard errors";
-        return Err(Failure::Usage(reason.into()));
+        return Err(Failure::usage(
+            "--stderr-image: only pictures have standard errors",
+        ));
     }
     let parse = |more: &[OsString]| {
         let line = ["antumbra", &args.job].map(OsString::from);
@@ -219,13 +216,17 @@ fn check_bake(args: &FarmArgs) -> Result<(), Failure> {
     };
     // As the tasks are, with flags that are ours to set.
     let task = ["-o", "0.part", "--shard", "0/1"].map(OsString::from);
-    let Some(Command::Bake(bake)) = parse(&task)?.command else {
-        let reason = "flags after -- belong to the command";
-        return Err(Failure::Usage(reason.into()));
+    let Some(Command::Bake(mut bake)) = parse(&task)?.command else {
+        return Err(Failure::usage("flags after -- belong to the command"));
     };
-    if of_bake!(bake, args => args.output.len() != 1 || args.json.is_some()) {
-        let reason = "--output goes before --, and --json with `merge`";
-        return Err(Failure::Usage(reason.into()));
+    if args.lines.is_some() && bake.args_mut().lines().is_none() {
+        return Err(no_lines());
+    }
+    let (_, outputs, json, _) = bake.args().0.shared();
+    if outputs.len() != 1 || json.is_some() {
+        return Err(Failure::usage(
+            "--output goes before --, and --json with `merge`",
+        ));
     }
     let mut whole = Vec::new();
     for path in &args.output {
@@ -235,9 +236,13 @@ fn check_bake(args: &FarmArgs) -> Result<(), Failure> {
         whole.extend(["--lines".into(), path.clone().into_os_string()]);
     }
     match parse(&whole)?.command {
-        Some(Command::Bake(bake)) => of_bake!(bake, args => args.check()),
+        Some(Command::Bake(bake)) => bake.args().0.check(),
         _ => Ok(()),
     }
+}
+
+fn no_lines() -> Failure {
+    Failure::Usage("--lines: only visible has lines of sight".into())
 }
 
 /// Refuses flags that `render` does not know, before a hundred machines do, and those that are ours to set.

@@ -1,31 +1,118 @@
 //! `antumbra visible`: visibility between points, and viewsheds.
+//!
+//! - `viewshed`: viewsheds of a height raster, without rays;  `lines`: files of lines of sight
 
-use std::path::Path;
+mod lines;
+mod viewshed;
+
+use std::path::{Path, PathBuf};
 
 use antumbra::{Aabb, LocalOrigin};
-use antumbra_bake::{
-    Array, BitMatrix, Curvature, Entry, Eyes, Orientation, Sensors, VisibilityJob, ones,
-};
-use antumbra_image::atomic_write;
+use antumbra_bake::{Array, BitMatrix, Entry, Eyes, Orientation, Sensors, UpAxis, VisibilityJob};
 use antumbra_lab::count;
 use antumbra_raster::{Quantity, unit_name};
+use clap::{ArgGroup, Args};
 
 use super::command::{Bake, Baking, Done, Figure, Named, text};
 use super::files::{self, Column, Format};
 use super::ground::{self, Ground};
 use super::map::{self, Plan, Words};
+use super::raster;
 use super::site::Asked;
-use super::{raster, viewshed};
-use crate::args::VisibleArgs;
+use crate::args::{
+    ChunkArgs, MapArgs, RasterArgs, SCENE, SCENE_LONG, UnitArgs, heading, up_axis, values,
+};
 use crate::exit::{Failure, tell};
+use crate::interrupt;
+use crate::json::Destination;
 use crate::output::Files;
-use crate::{interrupt, output};
+use lines::Ends;
 
 /// Name of the value of viewsheds in files.
 pub const SEEN_BY: Quantity<'static> = Quantity {
     name: "seen_by",
     unit: "",
 };
+
+/// Flags of `visible`.
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("surface"))]
+pub struct VisibleArgs {
+    #[arg(help = SCENE, long_help = SCENE_LONG)]
+    pub scene: PathBuf,
+    /// Points that look: x, y [, z] [, nx, ny, nz]
+    ///
+    /// Points without the column of heights (z, or y where y is up) are put on the surface that is seen from above.
+    /// Columns are known by the names in the first line, or else by their order. Points with normals look from a little
+    /// above their surface, and see nothing behind it.
+    #[arg(value_name = "A.csv")]
+    pub from: PathBuf,
+    /// Points looked at [default: the points of A.csv]
+    #[arg(value_name = "B.csv", conflicts_with = "surface")]
+    pub to: Option<PathBuf>,
+    /// Result: .npz, .csv, .ply, .png, .svg, .pdf or .tif
+    ///
+    /// May be given several times. An .npz has the matrix as bits with the counts, a .csv the count of every point of A (of a
+    /// viewshed: of every place), a .ply the points of A or the mesh in colours, and a .png, .svg or .pdf a map of
+    /// --viewshed with --grid. Beside a .png is a .pgw, the world file for GIS programs. A .tif (GeoTIFF), .asc or .npy has the
+    /// counts in the cells of a --grid or of a scene that is a raster. A shard is a .part.
+    #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
+    pub output: Vec<PathBuf>,
+    #[command(flatten)]
+    pub map: MapArgs,
+    #[command(flatten)]
+    pub raster: RasterArgs,
+    /// Lines of sight: .csv of pairs, .ply of edges
+    ///
+    /// Lines of sight of shards are written by `merge`.
+    #[arg(long, value_name = "FILE", value_parser = values::output_file(), conflicts_with = "shard", help_heading = heading::OUTPUT)]
+    pub lines: Option<PathBuf>,
+    /// Figures as JSON; - is the standard output
+    #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
+    pub json: Option<Destination>,
+    /// Count the observers that see each vertex
+    #[arg(long, group = "surface", help_heading = heading::WORK)]
+    pub viewshed: bool,
+    /// Take a grid on the surface instead of vertices
+    ///
+    /// The places lie so many units apart. They are those that are seen from above.
+    #[arg(long, value_name = "UNITS", requires = "viewshed", value_parser = values::positive, help_heading = heading::WORK)]
+    pub grid: Option<f64>,
+    /// Height of observers above A
+    #[arg(long, value_name = "UNITS", default_value_t = 0.0, value_parser = values::from_zero, help_heading = heading::WORK)]
+    pub eye: f64,
+    /// Targets above B, or the surface
+    #[arg(long, value_name = "UNITS", default_value_t = 0.0, value_parser = values::from_zero, help_heading = heading::WORK)]
+    pub target: f64,
+    /// Left out at both ends [default: origin offset]
+    ///
+    /// The origin offset is about 4 millionths of the largest coordinate of the point and of its surface. A point on a surface is
+    /// rounded, and without a margin its own surface hides it now and then. 0 takes the bare lines. The viewshed of a height
+    /// raster is then made by rays too, instead of exactly.
+    #[arg(long, value_name = "UNITS", value_parser = values::from_zero, help_heading = heading::WORK)]
+    pub margin: Option<f64>,
+    /// Axis that points up [default: the scene's]
+    #[arg(long, value_name = "AXIS", value_parser = up_axis, help_heading = heading::WORK)]
+    pub up: Option<UpAxis>,
+    /// Greatest distance of sight, in plan
+    #[arg(long, value_name = "UNITS", requires = "viewshed", value_parser = values::positive, help_heading = heading::WORK)]
+    pub radius: Option<f64>,
+    /// Round earth, and light that air bends
+    ///
+    /// Places d away lie lower by (1 - k) d² / (2 R), with --refraction k and the --earth-radius R.
+    #[arg(long, help_heading = heading::WORK)]
+    pub curvature: bool,
+    /// Refraction; 0 without air
+    #[arg(long, value_name = "K", default_value_t = antumbra_bake::REFRACTION, allow_negative_numbers = true, requires = "curvature", help_heading = heading::WORK)]
+    pub refraction: f64,
+    /// Radius of the earth
+    #[arg(long, value_name = "METRES", default_value_t = antumbra_bake::EARTH_RADIUS, requires = "curvature", value_parser = values::positive, help_heading = heading::WORK)]
+    pub earth_radius: f64,
+    #[command(flatten, next_help_heading = heading::WORK)]
+    pub units: UnitArgs,
+    #[command(flatten)]
+    pub chunks: ChunkArgs,
+}
 
 impl Baking for VisibleArgs {
     fn check(&self) -> Result<(), Failure> {
@@ -48,8 +135,12 @@ impl Baking for VisibleArgs {
             }
         }
         self.map.check()?;
-        let lines = self.lines.as_deref();
-        lines.map_or(Ok(()), |path| line_format(path).map(drop))
+        let path = self.lines.as_deref();
+        path.map_or(Ok(()), |path| lines::format(path).map(drop))
+    }
+
+    fn lines(&mut self) -> Option<&mut Option<PathBuf>> {
+        Some(&mut self.lines)
     }
 
     fn files(&self) -> [Vec<Named<'_>>; 2] {
@@ -96,7 +187,7 @@ impl Baking for VisibleArgs {
                     local: ground.local,
                     is_viewshed: self.viewshed,
                 };
-                lines(path, &ends, matrix)?;
+                lines::write(path, &ends, matrix)?;
             }
         }
         let counts = [Some(&rows), columns.as_ref()].map(|eyes| eyes.map(|eyes| eyes.points.len()));
@@ -109,11 +200,6 @@ impl Baking for VisibleArgs {
         };
         sight.end(self, bake, &done, || ground.tell(""))
     }
-}
-
-/// Format of lines of sight.
-fn line_format(path: &Path) -> Result<Format, Failure> {
-    Format::of(path, &["csv", "ply"], "lines are written as csv or ply")
 }
 
 /// Points in question, and their eyes, which are the ends of lines of sight. Places of a viewshed have the rows, since
@@ -317,67 +403,6 @@ pub fn npz(
         Entry::new(column_name, Array::Places(columns, local)),
     ];
     files::npz(path, &entries)
-}
-
-/// Ends of lines of sight.
-pub struct Ends<'a> {
-    pub rows: &'a [[f32; 3]],
-    /// `None` if rows and columns have the same.
-    pub columns: Option<&'a [[f32; 3]]>,
-    /// How the points are bent.
-    pub curvature: Option<Curvature>,
-    pub local: LocalOrigin,
-    pub is_viewshed: bool,
-}
-
-/// Writes the pairs that see each other; of points of one list, each pair once.
-pub fn lines(path: &Path, ends: &Ends<'_>, matrix: &BitMatrix) -> Result<(), Failure> {
-    let once = ends.columns.is_none();
-    let (local, is_viewshed) = (ends.local, ends.is_viewshed);
-    let pairs = || {
-        (0..matrix.rows()).flat_map(move |row| {
-            let columns = ones(matrix.row(row)).filter(move |&column| !once || column > row);
-            columns.map(move |column| (row, column))
-        })
-    };
-    let count = pairs().count() as u64;
-    if line_format(path)? == Format::Csv {
-        output::check_room(path, 16 * count)?;
-        return Ok(atomic_write(path, |file| {
-            writeln!(file, "from,to")?;
-            pairs().try_for_each(|(row, column)| match is_viewshed {
-                true => writeln!(file, "{column},{row}"),
-                false => writeln!(file, "{row},{column}"),
-            })
-        })?);
-    }
-    let rows = ends.rows;
-    let columns = ends.columns.unwrap_or_default();
-    let first = if once { 0 } else { rows.len() };
-    let vertices = rows.len() + columns.len();
-    output::check_room(path, 24 * vertices as u64 + 8 * count)?;
-    let is_local = local != LocalOrigin::default();
-    let real = if is_local { "double" } else { "float" };
-    Ok(atomic_write(path, |file| {
-        write!(
-            file,
-            "ply\nformat binary_little_endian 1.0\ncomment written by antumbra\nelement vertex {vertices}\n\
-             property {real} x\nproperty {real} y\nproperty {real} z\nelement edge {count}\n\
-             property int vertex1\nproperty int vertex2\nend_header\n"
-        )?;
-        for point in rows.iter().chain(columns) {
-            let unbent = ends.curvature.map(|curvature| curvature.unbend(*point));
-            let point = &unbent.unwrap_or(*point);
-            match is_local {
-                true => file.write_all(local.world(*point).map(f64::to_le_bytes).as_flattened())?,
-                false => file.write_all(point.map(f32::to_le_bytes).as_flattened())?,
-            }
-        }
-        pairs().try_for_each(|(row, column)| {
-            file.write_all(&(row as u32).to_le_bytes())?;
-            file.write_all(&((first + column) as u32).to_le_bytes())
-        })
-    })?)
 }
 
 /// Figures about who sees what.

@@ -1,20 +1,17 @@
-//! Tables of groups: `sun --groups`, and the surfaces of `factors`.
+//! Tables of groups: `sun --groups`.
 
 use std::fmt::Write as _;
 use std::path::Path;
 
-use antumbra_bake::{Groups, Orientation, Sensors, Surface};
+use antumbra_bake::{Groups, Sensors, Surface};
 use antumbra_image::atomic_write;
 use antumbra_lab::write_json;
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 
-use super::files::{Format, field};
-use super::ground::Ground;
-use super::sun::Baked;
-use crate::args::By;
+use super::Baked;
+use crate::bake::files::{Format, field};
 use crate::exit::{Failure, say};
-use crate::interrupt;
 use crate::scenes::rounded;
 
 /// Values of a group with their names, in the order of the columns.
@@ -38,37 +35,13 @@ pub fn is_table(path: &Path) -> Result<bool, Failure> {
     Ok(Format::of(path, &["csv", "json"], sentence)? == Format::Csv)
 }
 
-/// Groups of the triangles of a scene whose surfaces are known. `compass` says where its north is.
-pub fn of(ground: &Ground, by: By, compass: &Orientation) -> Result<Groups, Failure> {
-    let (mesh, parts) = (&ground.mesh, &ground.parts);
-    match by {
-        By::Material if !parts.has_materials() => {
-            let reason = "--by material: no material of the scene has a name";
-            Err(Failure::scene(&ground.loaded.scene.name, reason))
-        }
-        By::Material => Ok(Groups::new(mesh, vec!["material"], |triangle| {
-            let part = parts.part(triangle);
-            vec![part.map_or_else(String::new, |part| part.material.clone())]
-        })),
-        By::Object => {
-            let objects = parts.objects(mesh);
-            let name = |triangle| vec![objects.name(triangle)];
-            Ok(Groups::new(mesh, vec!["object"], name))
-        }
-        By::Facade => {
-            let objects = parts.objects(mesh);
-            let sides = mesh.sides(ground.kinds(), compass);
-            let name = |triangle: usize| vec![objects.name(triangle), sides[triangle].to_owned()];
-            Ok(Groups::new(mesh, vec!["object", "facade"], name))
-        }
-    }
-}
-
 impl Baked<'_> {
     /// Writes means, ends and sums of the values of each group, and returns them.
     pub fn groups(&self, path: &Path) -> Result<Vec<Row>, Failure> {
-        let _writing = interrupt::writing();
-        let groups = of(self.ground, self.args.by, &self.sunlight.orientation)?;
+        let groups = self
+            .args
+            .by
+            .groups(self.ground, &self.sunlight.orientation)?;
         let triangles = self.places.triangles(self.ground, self.up, &groups)?;
         let cover = Cover::new(&groups, self.sensors, &triangles);
         let metres = self.args.places.units.metres();
@@ -79,8 +52,7 @@ impl Baked<'_> {
         if let Some(spacing) = self.args.places.placement.surfaces {
             self.check_areas(&groups, &cover, &whole, spacing * spacing);
         }
-        let mut columns = self.values();
-        columns.retain(|(name, _)| *name != "sky_open");
+        let columns = self.columns().filter(|value| value.name != "sky_open");
         let mut rows: Vec<Row> = Vec::new();
         for (names, area) in groups.names.iter().zip(&areas) {
             let mut row = Row(Vec::new());
@@ -90,8 +62,9 @@ impl Baked<'_> {
             row.push("area_m2", number(*area));
             rows.push(row);
         }
-        for (index, (name, list)) in columns.into_iter().enumerate() {
-            let found = groups.statistics(&cover.open, &list);
+        for (index, column) in columns.enumerate() {
+            let name = column.name;
+            let found = groups.statistics(&cover.open, &column.list);
             for ((row, own), area) in rows.iter_mut().zip(found).zip(&areas) {
                 if index == 0 {
                     row.push("sensors", own.count.into());

@@ -13,8 +13,10 @@ use antumbra_render::{
 };
 use antumbra_scene::Scene;
 
+use super::looks::Looks;
+use super::until::Until;
+use crate::args::RenderArgs;
 use crate::exit::{Failure, say, tell};
-use crate::looks::Looks;
 use crate::output::Files;
 use crate::progress::Progress;
 use crate::{archive, interrupt, output};
@@ -22,17 +24,12 @@ use crate::{archive, interrupt, output};
 /// Flag that keeps the samples of a finished picture.
 pub const KEEP: &str = "--keep-samples";
 
-/// Where the checkpoint of an output lies. Streams have none.
-pub fn beside(output: &Path) -> Option<PathBuf> {
-    output::beside(output, ".checkpoint")
-}
-
 /// Notes the checkpoint of an output as a file to be written.
 ///
 /// # Errors
 /// Another file of the run is the same one, or it is no checkpoint of this program, which is then left as it is.
 pub fn declare(output: &Path, files: &mut Files) -> Result<(), Failure> {
-    let Some(path) = beside(output) else {
+    let Some(path) = output::checkpoint(output) else {
         return Ok(());
     };
     files.writes("the checkpoint", &path)?;
@@ -75,13 +72,13 @@ pub struct Keeper<'a> {
 }
 
 impl<'a> Keeper<'a> {
-    /// For the rendering of a scene to `output`, with a checkpoint every so often.
+    /// For the rendering of a scene to `output`, which people look at meanwhile.
     pub fn new(
+        args: &'a RenderArgs,
         scene: &'a Scene,
         options: &'a Options,
         output: &Path,
-        every: Duration,
-        order_file: Option<&'a Path>,
+        looks: Looks,
     ) -> Self {
         let [x0, x1, y0, y1] = scene.film.pixel_bounds().map(u64::from);
         let spp = options.spp.unwrap_or(scene.sampler.pixel_samples);
@@ -89,12 +86,12 @@ impl<'a> Keeper<'a> {
         Self {
             scene,
             options,
-            path: beside(output),
-            looks: Looks::default(),
-            every,
-            order_file,
+            path: output::checkpoint(output),
+            looks,
+            every: args.checkpoint_every.0,
+            order_file: args.save_order.as_deref(),
             progress: Progress::of_picture(&scene.name, samples),
-            grows: false,
+            grows: Until::of(&args.until).is_some(),
             identity: OnceLock::new(),
             last: Mutex::new(Instant::now()),
             writing: AtomicBool::new(false),
@@ -102,18 +99,6 @@ impl<'a> Keeper<'a> {
             failing: AtomicBool::new(false),
             order_failure: Mutex::default(),
         }
-    }
-
-    /// Shows the picture so far.
-    pub fn with_looks(mut self, looks: Looks) -> Self {
-        self.looks = looks;
-        self
-    }
-
-    /// Samples are added until something else than their number ends it: checkpoints may have any number.
-    pub fn growing(mut self, grows: bool) -> Self {
-        self.grows = grows;
-        self
     }
 
     /// Identity of the rendering. Computed on first use, because large scenes take time.

@@ -8,11 +8,11 @@ use antumbra_bake::{
 };
 use antumbra_raster::Site;
 
-use super::ground::Ground;
-use super::map;
-use super::raster::is_raster;
-use super::site::Asked;
-use crate::args::SunArgs;
+use super::SunArgs;
+use crate::bake::ground::Ground;
+use crate::bake::map;
+use crate::bake::raster::is_raster;
+use crate::bake::site::Asked;
 use crate::exit::{Failure, say};
 use crate::input;
 
@@ -191,8 +191,7 @@ impl When {
         };
         steps.retain(|step| times.counts(step.hour(), step.begin.month, self.place.latitude));
         if steps.is_empty() {
-            let reason = "--hours, --months: no step of time is left";
-            return Err(Failure::Usage(reason.into()));
+            return Err(Failure::usage("--hours, --months: no step of time is left"));
         }
         Ok(steps)
     }

@@ -7,12 +7,12 @@ use antumbra_bake::{
 };
 use antumbra_lab::count;
 
-use super::command::Bake;
-use super::files::{self, Column, Format};
-use super::raster;
-use super::terrain::{Terrain, is_terrain};
-use super::visible::{self, Ends, SEEN_BY, Sight};
-use crate::args::VisibleArgs;
+use super::lines::{self, Ends};
+use super::{SEEN_BY, Sight, VisibleArgs};
+use crate::bake::command::Bake;
+use crate::bake::files::{self, Column, Format};
+use crate::bake::raster;
+use crate::bake::terrain::{Terrain, is_terrain};
 use crate::exit::{Failure, tell};
 use crate::output::Files;
 use crate::{input, interrupt, scenes};
@@ -28,7 +28,7 @@ pub fn is_of_cells(args: &VisibleArgs) -> bool {
 pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
     let terrain = bake.terrain(&mut files)?;
     tell_read(&terrain);
-    terrain.settle(&visible::asked(args))?;
+    terrain.settle(&super::asked(args))?;
     let start = Instant::now();
     let field = terrain.field()?;
     let build_seconds = start.elapsed().as_secs_f64();
@@ -141,7 +141,7 @@ impl Table {
             });
         }
         let ends = [terrain.extent.low, terrain.extent.high].map(|corner| corner.to_array());
-        visible::warn_of_far(path, points.iter().copied(), ("raster", ends));
+        super::warn_of_far(path, points.iter().copied(), ("raster", ends));
         Ok(Self { observers, points })
     }
 }
@@ -198,7 +198,7 @@ fn write(
                 let observers = table.points.iter().map(|&point| local.local(point));
                 let observers: Vec<[f32; 3]> = observers.collect();
                 let places = [&rows.points[..], &observers];
-                visible::npz(path, (true, places, local), &matrix, &counts)?;
+                super::npz(path, (true, places, local), &matrix, &counts)?;
             }
             _ => {
                 let values: Vec<f32> = seen.iter().map(|&count| count as f32).collect();
@@ -221,7 +221,7 @@ fn write(
             local,
             is_viewshed: true,
         };
-        visible::lines(path, &ends, &matrix)?;
+        lines::write(path, &ends, &matrix)?;
     }
     Ok(())
 }

@@ -6,11 +6,10 @@ use std::path::Path;
 use antumbra_bake::{Array, Entry, Hourly};
 use antumbra_image::atomic_write;
 
-use super::files::{self, Format};
-use super::sun::Baked;
-use crate::args::Shown;
+use super::Baked;
+use crate::bake::files::{self, Format};
 use crate::exit::Failure;
-use crate::{interrupt, output};
+use crate::output;
 
 /// Format of a file of steps of time.
 pub fn format(path: &Path) -> Result<Format, Failure> {
@@ -21,7 +20,6 @@ pub fn format(path: &Path) -> Result<Format, Failure> {
 impl Baked<'_> {
     /// Writes the value of each sensor in each step of time: as a table with a line for each step, or as arrays.
     pub fn hourly(&self, path: &Path) -> Result<(), Failure> {
-        let _writing = interrupt::writing();
         let format = format(path)?;
         let sensors = self.sensors;
         let hourly = Hourly::new(self.sunlight)?;
@@ -54,17 +52,13 @@ impl Baked<'_> {
 
     /// Values of all sensors in a step of time; NaN for a sensor without a value.
     fn step<'a>(&'a self, hourly: &'a Hourly<'_>, step: usize) -> impl Iterator<Item = f64> + 'a {
-        let (sensors, found) = (self.sensors, self.found);
+        let (sensors, found, shown) = (self.sensors, self.found, self.shown());
         (0..sensors.points.len()).map(move |row| {
             let seen = (&found.suns_seen, &found.sky_seen, row);
             let normal = sensors.normals.get(row).copied();
             let receipt = hourly.receipt(step, seen, normal);
-            receipt.map_or(f64::NAN, |receipt| match self.args.show {
-                Shown::Hours => receipt.hours,
-                Shown::Direct => receipt.direct,
-                Shown::Diffuse => receipt.diffuse,
-                Shown::Total => receipt.direct + receipt.diffuse,
-                Shown::SkyView => found.values.sky_view[row],
+            receipt.map_or(f64::NAN, |receipt| {
+                (shown.of_step)(&receipt).unwrap_or(shown.list[row])
             })
         })
     }

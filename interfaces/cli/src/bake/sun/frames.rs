@@ -6,8 +6,8 @@ use antumbra_bake::{Hourly, Moment, Sunlight};
 use antumbra_image::atomic_write;
 use antumbra_map::{Animation, Drawing, Steps};
 
-use super::map;
-use super::sun::Baked;
+use super::Baked;
+use crate::bake::map;
 use crate::exit::Failure;
 use crate::interrupt;
 use crate::output::{self, Files};
@@ -29,8 +29,9 @@ pub fn is_gif(path: &Path) -> Result<bool, Failure> {
         [_, true] => Ok(false),
         _ => {
             let path = path.display();
-            let reason = format!("{path}: moving shadows are written as gif or png");
-            Err(Failure::Usage(reason))
+            Err(Failure::usage(format_args!(
+                "{path}: moving shadows are written as gif or png"
+            )))
         }
     }
 }
@@ -72,7 +73,6 @@ pub fn declare(path: &Path, sunlight: &Sunlight, files: &mut Files) -> Result<()
 impl Baked<'_> {
     /// Writes a map for each step of time with a sun: as a .gif, or as numbered .png files.
     pub fn frames(&self, path: &Path) -> Result<(), Failure> {
-        let _writing = interrupt::writing();
         let hourly = Hourly::new(self.sunlight)?;
         let suns = &self.sunlight.suns;
         let steps = steps(&hourly)?;

@@ -75,75 +75,70 @@ pub struct Grown {
     pub interrupted: bool,
 }
 
-/// Renders in steps until a limit is reached. Continues from the samples of an earlier run, if there are any. Sets the
-/// samples per pixel of `options` to the number in the picture.
+/// Renders a task, or without its shard and training rays in steps until a limit is reached, from its samples on. Sets the samples per
+/// pixel of `options` to the number in the picture.
 ///
-/// An interruption ends with the last finished step of this run, if there is one.
+/// An interruption of steps ends with the last finished step of this run, if there is one.
 pub fn render(
     world: &World,
     options: &mut Options,
     most: Option<u32>,
-    until: Until,
+    until: Option<Until>,
     monitor: &dyn Monitor,
-    resume: Option<Snapshot>,
+    task: Task,
 ) -> Result<Grown, Error> {
+    let before = task.resume.as_ref().map_or(0.0, Snapshot::seconds);
+    let Some(until) = until else {
+        let (rendering, snapshot) = render_task(world, options, task, monitor)?;
+        return Ok(Grown {
+            seconds: before + rendering.stats.render_seconds,
+            rendering,
+            snapshot,
+            interrupted: false,
+        });
+    };
     let most = most.unwrap_or(Sampler::MAX_SAMPLES);
-    let before = resume.as_ref().map_or(0.0, Snapshot::seconds);
     let start = Instant::now();
     let elapsed = || start.elapsed() + Duration::try_from_secs_f64(before).unwrap_or_default();
-    let mut spp = resume.as_ref().map_or(FIRST.min(most), Snapshot::spp);
-    options.spp = Some(spp);
-    let task = Task {
-        resume,
-        extendable: true,
-        ..Task::default()
-    };
-    let (mut rendering, mut snapshot) = render_task(world, options, task, monitor)?;
-    let mut seconds = before + rendering.stats.render_seconds;
-    loop {
-        let noise = noise(&rendering);
-        let Some(next) = until.next(spp, most, elapsed(), noise) else {
-            break;
-        };
-        options.spp = Some(next);
-        // A sampler whose samples depend on their number begins afresh.
-        let resume = snapshot.clone().extend(world, next).ok();
-        let is_afresh = resume.is_none();
+    let mut step = |spp: u32, resume: Option<Snapshot>| {
+        options.spp = Some(spp);
         let task = Task {
             resume,
             extendable: true,
             ..Task::default()
         };
-        match render_task(world, options, task, monitor) {
-            Ok(step) => {
-                (rendering, snapshot) = step;
-                seconds = match is_afresh {
-                    true => rendering.stats.render_seconds,
-                    false => seconds + rendering.stats.render_seconds,
-                };
+        render_task(world, options, task, monitor)
+    };
+    let resume = task.resume;
+    let mut spp = resume.as_ref().map_or(FIRST.min(most), Snapshot::spp);
+    let (rendering, snapshot) = step(spp, resume)?;
+    let mut grown = Grown {
+        seconds: before + rendering.stats.render_seconds,
+        rendering,
+        snapshot,
+        interrupted: false,
+    };
+    while let Some(next) = until.next(spp, most, elapsed(), noise(&grown.rendering)) {
+        // A sampler whose samples depend on their number begins afresh.
+        let resume = grown.snapshot.clone().extend(world, next).ok();
+        let before = if resume.is_some() { grown.seconds } else { 0.0 };
+        match step(next, resume) {
+            Ok((rendering, snapshot)) => {
+                grown.seconds = before + rendering.stats.render_seconds;
+                (grown.rendering, grown.snapshot, spp) = (rendering, snapshot, next);
             }
             Err(Error::Cancelled) => {
                 say(format_args!(
                     "interrupted: the image has {spp} samples per pixel"
                 ));
-                options.spp = Some(spp);
-                return Ok(Grown {
-                    rendering,
-                    snapshot,
-                    seconds,
-                    interrupted: true,
-                });
+                grown.interrupted = true;
+                break;
             }
             Err(error) => return Err(error),
         }
-        spp = next;
     }
-    Ok(Grown {
-        rendering,
-        snapshot,
-        seconds,
-        interrupted: false,
-    })
+    options.spp = Some(spp);
+    Ok(grown)
 }
 
 #[cfg(test)]
@@ -203,7 +198,14 @@ mod tests {
             ..Options::default()
         };
         let count = Count::default();
-        let grown = render(&world, &mut options, Some(64), until, &count, None);
+        let grown = render(
+            &world,
+            &mut options,
+            Some(64),
+            Some(until),
+            &count,
+            Task::default(),
+        );
         let grown = grown.expect("a picture");
         assert!(!grown.interrupted);
         assert_eq!(grown.snapshot.spp(), 64);

@@ -1,0 +1,355 @@
+//! `antumbra sun`: hours of direct sun, sky view factors and irradiation of sensors.
+//!
+//! The steps of the command, each in a file of its own: `when`: place and times, before anything is traced;  `values`: the list of
+//! values, after it;  `outputs`, with the `words` of maps;  `hourly`, `frames`, `groups`: values by step of time, moving shadows,
+//! means by object;  `report`: what is said at the end
+
+mod frames;
+mod groups;
+mod hourly;
+mod outputs;
+mod report;
+mod values;
+mod when;
+mod words;
+
+use std::path::PathBuf;
+use std::str::FromStr;
+use std::time::Instant;
+
+use antumbra_bake::{Moment, Sensors, SkyDivision, SunFound, SunJob, Sunlight, UpAxis};
+use clap::{ArgGroup, Args};
+
+use super::command::{Bake, Baking, Figure, Named};
+use super::files::Format;
+use super::ground::Ground;
+use super::parts::By;
+use super::places::{self, Places};
+use crate::args::{
+    ChunkArgs, MapArgs, PlaceArgs, RasterArgs, SCENE, SCENE_LONG, TimeArgs, heading,
+    values as checked,
+};
+use crate::exit::Failure;
+use crate::interrupt;
+use crate::json::Destination;
+use crate::output::Files;
+use groups::Row;
+use values::{Shown, Value};
+use when::{When, read_weather};
+
+/// Flags of `sun`.
+#[derive(Debug, Args)]
+#[command(group = ArgGroup::new("where").required(true))]
+pub struct SunArgs {
+    #[arg(help = SCENE, long_help = SCENE_LONG)]
+    pub scene: PathBuf,
+    /// Result: .csv, .ply, .npz, .png, .svg, .pdf or .tif
+    ///
+    /// May be given several times. A .csv has a line per sensor, a .ply the mesh or the sensors in colours, a .png, .svg
+    /// or .pdf a map of a --grid, and an .npz all values with the visibility matrices. Beside a .png is a .pgw, the world file
+    /// for GIS programs. A .tif (GeoTIFF), .asc or .npy has the value of --show in the cells of a --grid or of a scene that is a
+    /// raster. A shard is a .part.
+    #[arg(short, long, value_name = "OUT", required = true, value_parser = checked::output_file(), help_heading = heading::OUTPUT)]
+    pub output: Vec<PathBuf>,
+    /// Value that colours show
+    ///
+    /// hours, sky-view, and with --epw direct, diffuse and total.
+    #[arg(long, value_enum, default_value_t = Shown::Hours, hide_possible_values = true, help_heading = heading::OUTPUT)]
+    pub show: Shown,
+    #[command(flatten)]
+    pub map: MapArgs,
+    #[command(flatten)]
+    pub raster: RasterArgs,
+    /// Table of every step of time and every sensor
+    ///
+    /// A .csv with a line per step and a column per sensor: the value of --show of this step, in hours or Wh/m². An .npz has the
+    /// array values, steps x sensors, with times, the beginnings of the steps in Unix time, and points.
+    #[arg(long, value_name = "FILE", value_parser = checked::output_file(), conflicts_with = "shard", help_heading = heading::OUTPUT)]
+    pub hourly: Option<PathBuf>,
+    /// Means, ends and sums by object, material or facade
+    ///
+    /// A .csv or .json with a line for each group of --by: its area in m², its sensors, and of each value the mean, the smallest and
+    /// the largest of them. Energies have a sum too: the mean times the area, in kWh. Sensors belong to the surface that they are on,
+    /// or that is below them.
+    #[arg(long, value_name = "FILE", value_parser = checked::output_file(), conflicts_with = "shard", help_heading = heading::OUTPUT)]
+    pub groups: Option<PathBuf>,
+    /// object, material or facade
+    ///
+    /// Lines `o`, or else `g`, begin objects in an .obj; nodes are objects in a .gltf. Where nothing has a name, surfaces that touch are a
+    /// body. A facade is all of an object that faces one of eight sides of the compass; roofs, ground and undersides have lines too.
+    #[arg(long, value_name = "KIND", value_enum, default_value_t = By::Object, hide_possible_values = true, requires = "groups", help_heading = heading::OUTPUT)]
+    pub by: By,
+    /// Moving shadows: .gif, or .png for each step
+    ///
+    /// A map of each step of time with a sun above the horizon, with its time in the title. A .gif has them all. Of NAME.png, the
+    /// files are NAME-0001.png and so on. Needs --grid.
+    #[arg(long, value_name = "FILE", value_parser = checked::output_file(), conflicts_with = "shard", help_heading = heading::OUTPUT)]
+    pub frames: Option<PathBuf>,
+    /// Figures as JSON; - is the standard output
+    #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
+    pub json: Option<Destination>,
+    #[command(flatten)]
+    pub places: PlaceArgs,
+    /// Latitude, south negative [default: by --crs]
+    ///
+    /// If absent: the middle of the scene in its coordinate system (--crs, or the one in a GeoTIFF), or else the place of --epw.
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, requires = "lon", help_heading = heading::SUN)]
+    pub lat: Option<f64>,
+    /// Longitude, west negative [default: by --crs]
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, requires = "lat", help_heading = heading::SUN)]
+    pub lon: Option<f64>,
+    /// Above the sea [default: the weather's, or 0]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = heading::SUN)]
+    pub altitude: Option<f64>,
+    #[command(flatten)]
+    pub times: TimeArgs,
+    /// Weather of a year, for irradiance
+    ///
+    /// An .epw file of EnergyPlus. Gives the place and the steps of time, too.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["step", "year"], help_heading = heading::SUN)]
+    pub epw: Option<PathBuf>,
+    /// First moment, as 2024-06-21[T08:00]
+    ///
+    /// If absent: all of --year, or of the weather.
+    #[arg(long, value_name = "TIME", requires = "to", help_heading = heading::SUN)]
+    pub from: Option<Moment>,
+    /// End of the time; a date counts to its end
+    #[arg(long, value_name = "TIME", requires = "from", value_parser = end_of, help_heading = heading::SUN)]
+    pub to: Option<Moment>,
+    /// Year, without --from and --to
+    #[arg(long, value_name = "YEAR", default_value_t = 2025, conflicts_with = "from", value_parser = clap::value_parser!(i32).range(1..=5999), help_heading = heading::SUN)]
+    pub year: i32,
+    /// Light that the ground reflects, with --epw
+    ///
+    /// As a part of what open level ground receives: 0.2 is usual. A tilted sensor receives albedo times that, times (1 - cos
+    /// tilt) / 2, whatever shades the ground. In the column reflected_kwh_m2, and in the total of --show.
+    #[arg(long, value_name = "PART", requires = "epw", value_parser = checked::part, help_heading = heading::SUN)]
+    pub albedo: Option<f64>,
+    /// Leave out suns lower than this
+    #[arg(long, value_name = "DEGREES", default_value_t = 0.0, value_parser = checked::from_zero, help_heading = heading::SUN)]
+    pub min_elevation: f64,
+    /// Class of sunlight by EN 17037
+    ///
+    /// In the column en17037 of a .csv: none, minimum (from 1.5 h), medium (3 h) or high (4 h). The time must be one day from 1
+    /// February to 21 March, in steps of at most 10 minutes. Give the least elevation of your country with --min-elevation.
+    #[arg(long, conflicts_with = "epw", help_heading = heading::SUN)]
+    pub en17037: bool,
+    /// Minutes from sun to sun
+    ///
+    /// Each sun stands for the step around it: the sun of the middle of the step.
+    #[arg(long, value_name = "MINUTES", default_value_t = 60.0, value_parser = checked::positive, help_heading = heading::SUN)]
+    pub step: f64,
+    /// 145, 577, 2305 or uniform:N
+    ///
+    /// 145 are by Tregenza, 577 and 2305 by Reinhart. uniform:N are N patches of the same size.
+    #[arg(long, value_name = "PATCHES", default_value = "145", value_parser = sky, help_heading = heading::SUN)]
+    pub sky: SkyDivision,
+    #[command(flatten)]
+    pub chunks: ChunkArgs,
+}
+
+/// Parses an end: a date counts to the midnight after it.
+fn end_of(text: &str) -> Result<Moment, String> {
+    let mut moment = Moment::from_str(text).map_err(|error| error.to_string())?;
+    if !text.contains(':') {
+        moment.seconds = 86_400.0;
+    }
+    Ok(moment)
+}
+
+/// Parses a division of the sky.
+fn sky(text: &str) -> Result<SkyDivision, String> {
+    let division = match text {
+        "145" | "tregenza" => SkyDivision::Tregenza,
+        "577" | "reinhart" => SkyDivision::Reinhart(2),
+        "2305" => SkyDivision::Reinhart(4),
+        _ => {
+            let count = text.strip_prefix("uniform:").and_then(|n| n.parse().ok());
+            let known = "known are 145, 577, 2305 and uniform:N";
+            SkyDivision::Uniform(count.ok_or(known)?)
+        }
+    };
+    division.patches().map_err(|error| error.to_string())?;
+    Ok(division)
+}
+
+/// Everything that files are made of.
+struct Baked<'a> {
+    ground: &'a Ground,
+    places: &'a Places,
+    sensors: &'a Sensors,
+    sunlight: &'a Sunlight,
+    found: &'a SunFound,
+    values: Vec<Value<'a>>,
+    args: &'a SunArgs,
+    when: &'a When,
+    /// Name of the weather.
+    weather: Option<&'a str>,
+    up: UpAxis,
+}
+
+impl Baking for SunArgs {
+    fn check(&self) -> Result<(), Failure> {
+        for path in &self.output {
+            match Format::of_sensors(path)? {
+                Format::Picture if self.places.grid.is_none() => {
+                    let path = path.display();
+                    return Err(Failure::Usage(format!("{path}: a map needs --grid")));
+                }
+                Format::Raster => places::check_raster(path, &self.places, &self.scene)?,
+                _ => {}
+            }
+        }
+        places::check(&self.places)?;
+        when::check(self)?;
+        if self.frames.is_some() && self.places.grid.is_none() {
+            return Err(Failure::Usage("--frames: maps need --grid".into()));
+        }
+        self.frames.as_deref().map(frames::is_gif).transpose()?;
+        self.groups.as_deref().map(groups::is_table).transpose()?;
+        if self.en17037 {
+            check_day(self)?;
+        }
+        self.map.check()?;
+        self.hourly.as_deref().map(hourly::format).transpose()?;
+        if self.epw.is_none() && self.show.needs_weather() {
+            return Err(Failure::Usage("--show: irradiation needs --epw".into()));
+        }
+        Ok(())
+    }
+
+    fn files(&self) -> [Vec<Named<'_>>; 2] {
+        let mut read = self.places.files().to_vec();
+        read.push(("--epw", self.epw.as_deref()));
+        let written = vec![
+            ("--hourly", self.hourly.as_deref()),
+            ("--groups", self.groups.as_deref()),
+            ("--frames", self.frames.as_deref()),
+        ];
+        [written, read]
+    }
+
+    fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
+        let begin = Instant::now();
+        let weather = self.epw.as_deref().map(read_weather).transpose()?;
+        let mut ground = bake.ground(&mut files, None)?;
+        let up = ground.up(self.places.up)?;
+        let (when, sunlight) = When::at(self, weather.as_ref(), &ground, up)?;
+        let mut frames = self.frames.iter();
+        frames.try_for_each(|path| frames::declare(path, &sunlight, &mut files))?;
+        let places = Places::new(&self.places, &mut ground, up)?;
+        if self.groups.is_some() && ground.surfaces.is_none() {
+            ground.face(&sunlight.orientation);
+        }
+        let sensors = &places.sensors;
+        let job = SunJob::new(&sensors.points, &sensors.normals, &sunlight)?;
+        let done = bake.compute(&job, &ground, &ground.bvh)?;
+        let baked = done.found.as_ref().map(|found| Baked {
+            ground: &ground,
+            places: &places,
+            sensors,
+            sunlight: &sunlight,
+            found,
+            values: values::list(&found.values, self.reflected(sensors, &sunlight)),
+            args: self,
+            when: &when,
+            weather: weather.as_ref().map(|weather| &*weather.name),
+            up,
+        });
+        let groups = baked.as_ref().map(|baked| baked.write_all(bake.outputs));
+        let groups = groups.transpose()?.flatten();
+        let mean = |shown| baked.as_ref()?.value(shown)?.mean();
+        let shown = [Shown::Hours, Shown::SkyView, Shown::Direct, Shown::Diffuse];
+        let means @ [hours, view, direct, diffuse] = shown.map(mean);
+        let rays = baked.as_ref().map_or(0, |_| job.rays());
+        let suns = &sunlight.suns;
+        let total = begin.elapsed().as_secs_f64();
+        let figures: &[Figure<'_>] = &[
+            ("outputs", &bake.output_names()),
+            ("shard", &bake.shard()),
+            ("triangles", &ground.mesh.indices.len()),
+            ("sensors", &sensors.points.len()),
+            ("place", &weather.as_ref().map(|weather| &weather.name)),
+            ("latitude", &when.place.latitude),
+            ("longitude", &when.place.longitude),
+            ("timezone", &when.zone),
+            ("steps", &sunlight.steps()),
+            ("suns", &suns.times.len()),
+            ("step_hours", suns.hours.first().unwrap_or(&0.0)),
+            ("patches", &sunlight.patches.len()),
+            ("rays", &rays),
+            ("mean_hours", &hours),
+            ("mean_sky_view", &view),
+            ("mean_direct_kwh_m2", &direct),
+            ("mean_diffuse_kwh_m2", &diffuse),
+            ("groups", &groups),
+            ("load_seconds", &ground.loaded.seconds),
+            ("build_seconds", &ground.build_seconds),
+            ("trace_seconds", &done.seconds),
+            ("total_seconds", &total),
+        ];
+        let name = ("antumbra.sun/1", &*ground.loaded.scene.name);
+        bake.document(name, figures, (&done, &format!("; {total:.2} s")))?;
+        if let Some(baked) = &baked {
+            ground.tell("");
+            baked.tell(means);
+            bake.end("rays", rays, &done);
+        }
+        Ok(())
+    }
+}
+
+impl SunArgs {
+    /// Light from the ground, if it is wanted.
+    fn reflected(&self, sensors: &Sensors, sunlight: &Sunlight) -> Option<Vec<f64>> {
+        let albedo = self.albedo?;
+        Some(sunlight.reflected(albedo, &sensors.normals, sensors.points.len()))
+    }
+}
+
+impl<'a> Baked<'a> {
+    /// Writes all files, during which no signal ends the program. Returns the rows of `--groups`.
+    fn write_all(&self, outputs: &[PathBuf]) -> Result<Option<Vec<Row>>, Failure> {
+        let _writing = interrupt::writing();
+        let args = self.args;
+        outputs.iter().try_for_each(|path| self.write(path))?;
+        args.hourly.iter().try_for_each(|path| self.hourly(path))?;
+        args.frames.iter().try_for_each(|path| self.frames(path))?;
+        args.groups
+            .as_ref()
+            .map(|path| self.groups(path))
+            .transpose()
+    }
+
+    /// A value that colours can show.
+    fn value(&self, shown: Shown) -> Option<&Value<'a>> {
+        self.values.iter().find(|value| value.shown == Some(shown))
+    }
+
+    /// The value of `--show`.
+    fn shown(&self) -> &Value<'a> {
+        self.value(self.args.show).unwrap_or(&self.values[0])
+    }
+
+    /// Values that tables have.
+    fn columns(&self) -> impl Iterator<Item = &Value<'a>> + Clone {
+        let all = self.values.iter();
+        all.filter(|value| value.shown != Some(Shown::Total))
+    }
+}
+
+/// Refuses times that EN 17037 does not mean.
+fn check_day(args: &SunArgs) -> Result<(), Failure> {
+    let is_day = args.from.zip(args.to).is_some_and(|(from, to)| {
+        let ends = [from, to].map(|moment| moment.unix(0.0));
+        let is_one = ends[1] - ends[0] <= 86_400.0 && (from.month, from.day) == (to.month, to.day);
+        is_one && ((2, 1)..=(3, 21)).contains(&(from.month, from.day))
+    });
+    let is_whole = args.times.hours.is_none() && args.times.months.is_none();
+    match is_day && is_whole && args.step <= 10.0 {
+        true => Ok(()),
+        false => Err(Failure::Usage(
+            "--en17037: wanted --from and --to on one day from 1 February to 21 March, and --step of at most 10".into(),
+        )),
+    }
+}
