@@ -11,7 +11,7 @@ use serde::{Serialize, Serializer};
 
 use crate::args::{InfoArgs, start_threads};
 use crate::exit::Failure;
-use crate::json;
+use crate::json::{self, Destination};
 use crate::output::Files;
 use crate::table::draw;
 use crate::{scenes, version};
@@ -34,8 +34,8 @@ struct Document {
     stored_triangles: usize,
     primitives: usize,
     dropped_primitives: usize,
-    materials: Materials,
-    lights: Lights,
+    materials: Counts,
+    lights: Counts,
     /// Corners of the smallest box around everything, in the world.
     bounds: Option<[[f64; 3]; 2]>,
     /// Where positions are measured from, so that single precision holds them.
@@ -57,27 +57,35 @@ struct Document {
     trees: Vec<TreeInfo>,
 }
 
-/// Materials by family; one with a bump map counts as what it is without.
-struct Materials(Vec<(&'static str, usize)>);
+/// Numbers of things by kind, in the order of the document.
+struct Counts(Vec<(&'static str, usize)>);
 
-impl Serialize for Materials {
+impl Serialize for Counts {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(self.0.iter().copied())
     }
 }
 
-/// Lights by kind; an area light is a shape that emits.
-#[derive(Default, Serialize)]
-struct Lights {
-    point: usize,
-    spot: usize,
-    distant: usize,
-    goniometric: usize,
-    projection: usize,
-    infinite: usize,
-    area: usize,
-    /// Triangles and spheres of the area lights.
-    area_primitives: usize,
+impl Counts {
+    fn new(kinds: &[&'static str], found: impl Iterator<Item = &'static str> + Clone) -> Self {
+        let count = |&kind: &&'static str| (kind, found.clone().filter(|k| *k == kind).count());
+        Self(kinds.iter().map(count).collect())
+    }
+
+    fn get(&self, kind: &str) -> usize {
+        let count = self.0.iter().find(|(name, _)| *name == kind);
+        count.map_or(0, |(_, count)| *count)
+    }
+
+    /// The numbers of usual kinds, and of rare ones that are there.
+    fn text(&self, usual: &[&str], rare: &[&str]) -> String {
+        let rare = rare.iter().filter(|kind| self.get(kind) > 0);
+        let all = usual.iter().chain(rare);
+        let all: Vec<String> = all
+            .map(|kind| format!("{} {kind}", self.get(kind)))
+            .collect();
+        all.join(", ")
+    }
 }
 
 /// Seconds of the clock: the text of the scene, its meshes, its images.
@@ -120,9 +128,7 @@ struct TreeInfo {
 pub fn run(args: &InfoArgs, memory: MemorySize) -> Result<(), Failure> {
     let mut files = Files::default();
     files.reads("the scene", &args.scene)?;
-    if let Some(json) = &args.json {
-        files.writes("--json", json.path())?;
-    }
+    files.writes_some([("--json", args.json.as_ref().map(Destination::path))])?;
     files.check()?;
     start_threads(None)?;
     let mut loaded = scenes::load_with_looks(&args.scene, memory)?;
@@ -173,7 +179,7 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
         stored_triangles: scene.stored_triangle_count(),
         primitives,
         dropped_primitives: dropped,
-        materials: materials(scene),
+        materials: Counts::new(&Material::families(), scene.materials.iter().map(family)),
         lights: lights(scene),
         bounds: extent.map(|Extent { low, high }| [low, high].map(|at| (at + scene.origin).into())),
         origin: scene.origin.into(),
@@ -214,44 +220,50 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
     })
 }
 
-fn materials(scene: &Scene) -> Materials {
-    let mut counts: Vec<_> = Material::FAMILIES.iter().map(|name| (*name, 0)).collect();
-    counts.dedup();
-    for material in &scene.materials {
-        let family = match material {
-            Material::Bumped(bumped) => bumped.material.family(),
-            Material::NormalMapped(mapped) => mapped.material.family(),
-            material => material.family(),
-        };
-        let found = counts.iter_mut().filter(|(name, _)| *name == family);
-        found.for_each(|(_, count)| *count += 1);
+/// Family of a material; one with a bump map counts as what it is without.
+fn family(material: &Material) -> &'static str {
+    match material {
+        Material::Bumped(bumped) => bumped.material.family(),
+        Material::NormalMapped(mapped) => mapped.material.family(),
+        material => material.family(),
     }
-    Materials(counts)
 }
 
-fn lights(scene: &Scene) -> Lights {
-    let mut counts = Lights::default();
-    for light in &scene.lights {
-        *match light {
-            Light::Point { .. } => &mut counts.point,
-            Light::Spot { .. } => &mut counts.spot,
-            Light::Distant { .. } => &mut counts.distant,
-            Light::Goniometric { .. } => &mut counts.goniometric,
-            Light::Projection { .. } => &mut counts.projection,
-            Light::Infinite { .. } => &mut counts.infinite,
-        } += 1;
+/// Kinds of lights, of which some are in every text.
+const LIGHTS: [&str; 6] = [
+    "point",
+    "spot",
+    "distant",
+    "goniometric",
+    "projection",
+    "infinite",
+];
+const USUAL_LIGHTS: [&str; 4] = ["point", "spot", "distant", "infinite"];
+
+fn kind_of_light(light: &Light) -> &'static str {
+    match light {
+        Light::Point { .. } => "point",
+        Light::Spot { .. } => "spot",
+        Light::Distant { .. } => "distant",
+        Light::Goniometric { .. } => "goniometric",
+        Light::Projection { .. } => "projection",
+        Light::Infinite { .. } => "infinite",
     }
-    for shape in scene
-        .standing_shapes()
-        .filter(|shape| shape.area_light.is_some())
-    {
-        counts.area += 1;
-        counts.area_primitives += match &shape.geometry {
-            Geometry::Mesh(mesh) => mesh.indices.len(),
-            Geometry::Sphere(_) => 1,
-            Geometry::Curves(curves) => curves.first.len(),
-        };
-    }
+}
+
+/// Lights by kind, then area lights, which are shapes that emit, and their triangles and spheres.
+fn lights(scene: &Scene) -> Counts {
+    let mut counts = Counts::new(&LIGHTS, scene.lights.iter().map(kind_of_light));
+    let shapes = scene.standing_shapes();
+    let primitives = shapes.filter(|shape| shape.area_light.is_some());
+    let primitives = primitives.map(|shape| match &shape.geometry {
+        Geometry::Mesh(mesh) => mesh.indices.len(),
+        Geometry::Sphere(_) => 1,
+        Geometry::Curves(curves) => curves.first.len(),
+    });
+    let primitives: Vec<usize> = primitives.collect();
+    counts.0.push(("area", primitives.len()));
+    counts.0.push(("area_primitives", primitives.iter().sum()));
     counts
 }
 
@@ -264,45 +276,9 @@ impl CameraInfo {
     }
 }
 
-impl Materials {
-    /// Counts of the first families, which most scenes have, and of others that are present.
-    fn text(&self) -> String {
-        let (common, others) = self.0.split_at(4);
-        let common = common.iter().map(|(name, count)| format!("{count} {name}"));
-        let others: Vec<_> = others.iter().map(|(name, count)| (*count, *name)).collect();
-        common.collect::<Vec<_>>().join(", ") + &present(&others)
-    }
-}
-
-impl Lights {
-    fn text(&self) -> String {
-        let others = [
-            (self.goniometric, "goniometric"),
-            (self.projection, "projection"),
-        ];
-        let Self {
-            point,
-            spot,
-            distant,
-            infinite,
-            ..
-        } = self;
-        format!(
-            "{point} point, {spot} spot, {distant} distant, {infinite} infinite{}",
-            present(&others)
-        )
-    }
-}
-
-/// The rarer kinds that are there, each after a comma.
-fn present(kinds: &[(usize, &str)]) -> String {
-    let present = kinds.iter().filter(|(count, _)| *count > 0);
-    present
-        .map(|(count, kind)| format!(", {count} {kind}"))
-        .collect()
-}
-
 fn text(document: &Document) -> String {
+    let families = Material::families();
+    let (usual, rare) = families.split_at(4);
     let Document {
         materials,
         lights,
@@ -310,6 +286,7 @@ fn text(document: &Document) -> String {
         film,
         ..
     } = document;
+    let ([width, height], [x0, x1, y0, y1]) = (film.resolution, film.pixel_bounds);
     let load = document.load.as_ref().map_or(String::new(), |load| {
         format!(
             " ({:.3} s text, {:.3} s meshes, {:.3} s images)",
@@ -320,20 +297,17 @@ fn text(document: &Document) -> String {
         Some([low, high]) => format!("{low:?} to {high:?}"),
         None => "none".to_owned(),
     };
-    let rows: Vec<_> = document
-        .trees
-        .iter()
-        .map(|tree| {
-            vec![
-                tree.width.to_string(),
-                count(tree.nodes as u64),
-                count(tree.leaves as u64),
-                tree.depth.to_string(),
-                format!("{:.1}", tree.bytes as f64 / 1e6),
-                format!("{:.3}", tree.build_seconds),
-            ]
-        })
-        .collect();
+    let row = |tree: &TreeInfo| {
+        vec![
+            tree.width.to_string(),
+            count(tree.nodes as u64),
+            count(tree.leaves as u64),
+            tree.depth.to_string(),
+            format!("{:.1}", tree.bytes as f64 / 1e6),
+            format!("{:.3}", tree.build_seconds),
+        ]
+    };
+    let rows: Vec<_> = document.trees.iter().map(row).collect();
     let header = ["width", "nodes", "leaves", "depth", "MB", "build s"];
     let trees = draw(&header, &rows);
     format!(
@@ -344,7 +318,7 @@ fn text(document: &Document) -> String {
          materials    {}\n\
          lights       {}, {} area with {} primitives\n\
          camera       at {:?} towards {:?}, {}, lens radius {}\n\
-         film         {} x {} pixels, of them x {} to {} and y {} to {}\n\
+         film         {width} x {height} pixels, of them x {x0} to {x1} and y {y0} to {y1}\n\
          integrator   {}, {} samples per pixel of the sampler {}\n\
          times        {:.3} s to load{load}, {:.3} s to lower, {:.3} s to build the binary tree ({})\n\
          {trees}",
@@ -357,20 +331,14 @@ fn text(document: &Document) -> String {
         count(document.objects as u64),
         count(document.instances as u64),
         count(document.stored_triangles as u64),
-        materials.text(),
-        lights.text(),
-        lights.area,
-        count(lights.area_primitives as u64),
+        materials.text(usual, rare),
+        lights.text(&USUAL_LIGHTS, &LIGHTS[3..5]),
+        lights.get("area"),
+        count(lights.get("area_primitives") as u64),
         camera.position,
         camera.direction,
         camera.view(),
         camera.lens_radius,
-        film.resolution[0],
-        film.resolution[1],
-        film.pixel_bounds[0],
-        film.pixel_bounds[1],
-        film.pixel_bounds[2],
-        film.pixel_bounds[3],
         document.integrator,
         document.spp,
         document.sampler,

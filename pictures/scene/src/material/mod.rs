@@ -149,8 +149,12 @@ macro_rules! materials {
         }
 
         impl Material {
-            /// All families in their order, perhaps several times.
-            pub const FAMILIES: &'static [&'static str] = &[$($family,)*];
+            /// All families, the most usual first.
+            pub fn families() -> Vec<&'static str> {
+                let mut families = vec![$($family),*];
+                families.dedup();
+                families
+            }
 
             /// Kinds that [`Self::read`] knows.
             pub const READ: &'static [&'static str] = &[$($(materials!(@ $read $family),)?)*];
