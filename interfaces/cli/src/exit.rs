@@ -43,6 +43,11 @@ impl Failure {
         Self::Usage(reason.to_string())
     }
 
+    /// A name of a file that cannot be meant.
+    pub fn name(path: &Path, reason: impl fmt::Display) -> Self {
+        Self::Usage(format!("{}: {reason}", path.display()))
+    }
+
     /// A scene with one thing to say about it.
     pub fn scene(name: impl fmt::Display, reason: impl fmt::Display) -> Self {
         Self::Scene(format!("error: {name}: {reason}"))

@@ -77,26 +77,35 @@ fn read(path: &Path) -> Result<Image, Failure> {
     Ok(Image::read_within(path, &allowance)?)
 }
 
+/// Ends of the names of channels.
+const RGB: [&str; 3] = [".R", ".G", ".B"];
+const XYZ: [&str; 3] = [".X", ".Y", ".Z"];
+
+/// Reads three channels of a layer, if they are there.
+fn read_channels(path: &Path, layer: &str, ends: [&str; 3]) -> Result<Option<Image>, Failure> {
+    let names = ends.map(|end| format!("{layer}{end}"));
+    Ok(Image::read_channels(
+        path,
+        names.each_ref().map(|name| &name[..]),
+    )?)
+}
+
 /// Reads a layer of an image, or its colours.
 fn read_layer(path: &Path, layer: Option<&str>) -> Result<Image, Failure> {
     let Some(layer) = layer else {
         return read(path);
     };
-    let is_exr = path
-        .extension()
-        .is_some_and(|name| name.eq_ignore_ascii_case("exr"));
-    if !is_exr {
+    if !output::is_one_of(path, &["exr"]) {
         let path = path.display();
         return Err(Failure::Usage(format!(
             "--layer: {path} has no layers; an .exr may have"
         )));
     }
     let found = Image::channel_names(path)?;
-    let channels = |ends: [&str; 3]| ends.map(|end| format!("{layer}{end}"));
-    let choices = [[""; 3], [".R", ".G", ".B"], [".X", ".Y", ".Z"]].map(channels);
-    for names in choices {
+    for ends in [[""; 3], RGB, XYZ] {
+        let names = ends.map(|end| format!("{layer}{end}"));
         if names.iter().all(|name| found.contains(name))
-            && let Some(image) = Image::read_channels(path, [0, 1, 2].map(|i| &names[i][..]))?
+            && let Some(image) = read_channels(path, layer, ends)?
         {
             return Ok(image);
         }
@@ -123,34 +132,14 @@ fn denoise(
     let library = antumbra_denoise::Library::open(library)
         .map_err(|error| Failure::Work(error.to_string()))?;
     let color = read(input)?;
-    let is_exr = input
-        .extension()
-        .is_some_and(|name| name.eq_ignore_ascii_case("exr"));
     let mut layers = [None, None];
-    if is_exr {
-        let names = [
-            &[
-                ["Albedo.R", "Albedo.G", "Albedo.B"],
-                [
-                    "Denoising Albedo.R",
-                    "Denoising Albedo.G",
-                    "Denoising Albedo.B",
-                ],
-            ][..],
-            &[
-                ["Ns.X", "Ns.Y", "Ns.Z"],
-                ["N.X", "N.Y", "N.Z"],
-                [
-                    "Denoising Normal.X",
-                    "Denoising Normal.Y",
-                    "Denoising Normal.Z",
-                ],
-            ][..],
-        ];
-        for (layer, names) in layers.iter_mut().zip(names) {
-            for &names in names {
+    if output::is_one_of(input, &["exr"]) {
+        let albedo = (&["Albedo", "Denoising Albedo"][..], RGB);
+        let normal = (&["Ns", "N", "Denoising Normal"][..], XYZ);
+        for (layer, (names, ends)) in layers.iter_mut().zip([albedo, normal]) {
+            for name in names {
                 if layer.is_none() {
-                    *layer = Image::read_channels(input, names)?;
+                    *layer = read_channels(input, name, ends)?;
                 }
             }
         }
@@ -242,12 +231,10 @@ fn compare_images(args: &CompareArgs) -> Result<ExitCode, Failure> {
     for path in images.chain(&args.stderr_a).chain(&args.stderr_b) {
         files.reads("the image", path)?;
     }
-    if let Some(json) = &args.json {
-        files.writes("--json", json.path())?;
-    }
-    if let Some(map) = &args.map {
-        files.writes("--map", map)?;
-    }
+    files.writes_some([
+        ("--json", args.json.as_ref().map(json::Destination::path)),
+        ("--map", args.map.as_deref()),
+    ])?;
     files.check()?;
     let mut image = read(&args.image)?;
     let mut reference = read(&args.reference)?;
@@ -348,8 +335,8 @@ fn document(args: &CompareArgs, comparison: &Comparison) -> Result<Document, Fai
     };
     Ok(Document {
         schema: "antumbra.compare/1",
-        image: args.image.to_string_lossy().into_owned(),
-        reference: args.reference.to_string_lossy().into_owned(),
+        image: output::text(&args.image),
+        reference: output::text(&args.reference),
         pass: z.pass,
         pixels: comparison.pixels,
         non_finite_image: comparison.non_finite_image,

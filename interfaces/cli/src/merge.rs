@@ -1,7 +1,5 @@
 //! `antumbra merge`: parts of a picture become the picture.
 
-use std::path::Path;
-
 use antumbra_load::MemorySize;
 use antumbra_render::{Snapshot, image_hash};
 use serde::Serialize;
@@ -10,7 +8,7 @@ use crate::args::{MergeArgs, usual};
 use crate::bake::{self, chunks::is_part};
 use crate::exit::{Failure, tell};
 use crate::json::Destination;
-use crate::output::Files;
+use crate::output::{Files, text};
 use crate::render::{check_image_names, hash_text};
 use crate::version::VERSION;
 use crate::{archive, interrupt, json};
@@ -89,10 +87,6 @@ pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
         tell(format_args!("wrote {path}"));
     }
     Ok(())
-}
-
-fn text(path: &Path) -> String {
-    path.to_string_lossy().into_owned()
 }
 
 /// The JSON document.

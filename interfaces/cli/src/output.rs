@@ -241,6 +241,18 @@ pub fn is_stream(path: &Path) -> bool {
     !matches!(Target::of(path), Ok(Target::File(_)) | Err(_))
 }
 
+/// Whether a path has one of some extensions, in letters of any case.
+pub fn is_one_of(path: &Path, known: &[&str]) -> bool {
+    let extension = path.extension().unwrap_or_default();
+    let mut known = known.iter();
+    known.any(|known| extension.eq_ignore_ascii_case(known))
+}
+
+/// A path as text.
+pub fn text(path: &Path) -> String {
+    path.to_string_lossy().into_owned()
+}
+
 /// Name of a file beside an output: the output's own with something added. Streams have none.
 pub fn beside(output: &Path, suffix: &str) -> Option<PathBuf> {
     if is_stream(output) {

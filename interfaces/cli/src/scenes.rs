@@ -20,7 +20,7 @@ use antumbra_trees::ORDERS;
 
 use crate::args::{CameraArgs, PictureArgs, PoseArgs};
 use crate::exit::{self, Failure, say, tell};
-use crate::{interrupt, progress};
+use crate::{interrupt, output, progress};
 
 /// Name of the standard input.
 pub const STDIN: &str = "-";
@@ -332,7 +332,7 @@ fn sky(path: &Path) -> Result<Sky, Failure> {
             Pixels::Rgb32(values)
         }
     };
-    let name = path.to_string_lossy().into_owned();
+    let name = output::text(path);
     Ok(Sky::Image(Arc::new(Image {
         name,
         width,

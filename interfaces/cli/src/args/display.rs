@@ -8,6 +8,7 @@ use clap::{Args, ValueEnum};
 use super::heading;
 use super::names::one_of;
 use crate::exit::{Failure, tell};
+use crate::output;
 
 /// Flags about values for displays.
 #[derive(Debug, Args)]
@@ -72,10 +73,7 @@ impl DisplayArgs {
                 100.0 * share
             ));
         }
-        let is_png = path
-            .extension()
-            .is_some_and(|name| name.eq_ignore_ascii_case("png"));
-        if self.bits == "16" && is_png {
+        if self.bits == "16" && output::is_one_of(path, &["png"]) {
             image.write_png16(path, &display)?;
         } else {
             image.write_for(path, &display)?;
@@ -100,9 +98,7 @@ pub fn usual(is_light: bool) -> Display {
 
 /// Whether files of this name hold values for displays.
 pub fn is_for_displays(path: &Path) -> bool {
-    let extension = path.extension().unwrap_or_default();
-    let mut names = ["png", "jpg", "jpeg"].into_iter();
-    names.any(|name| extension.eq_ignore_ascii_case(name))
+    output::is_one_of(path, &["png", "jpg", "jpeg"])
 }
 
 /// Names of layers in an EXR file.

@@ -56,31 +56,41 @@ impl FromStr for Noise {
     }
 }
 
-/// Parses a name; `None` is `auto`.
-fn auto_or<T: FromStr<Err = UnknownName>>(text: &str) -> Result<Option<T>, String> {
-    match text {
-        "auto" => Ok(None),
-        name => name
-            .parse()
-            .map(Some)
-            .map_err(|error| format!("{error}, auto")),
+/// A row of a list, or what suits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Choice<T> {
+    Auto,
+    Fixed(T),
+}
+
+impl<T: FromStr<Err = UnknownName>> FromStr for Choice<T> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            name => {
+                let row = name.parse().map_err(|error| format!("{error}, auto"));
+                row.map(Self::Fixed)
+            }
+        }
+    }
+}
+
+/// Several choices, each once.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Choices<T>(pub Vec<Choice<T>>);
+
+impl<T: FromStr<Err = UnknownName> + PartialEq> FromStr for Choices<T> {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        list(text, str::parse).map(Self)
     }
 }
 
 /// An instruction set or the best there is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LevelChoice {
-    Auto,
-    Fixed(Level),
-}
-
-impl FromStr for LevelChoice {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        auto_or(text).map(|fixed| fixed.map_or(Self::Auto, Self::Fixed))
-    }
-}
+pub type LevelChoice = Choice<Level>;
 
 impl LevelChoice {
     /// The instruction set, checked against this CPU.
@@ -93,8 +103,7 @@ impl LevelChoice {
 }
 
 /// Several instruction sets, each once.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Levels(pub Vec<LevelChoice>);
+pub type Levels = Choices<Level>;
 
 impl Levels {
     /// The instruction sets, each once and checked against this CPU.
@@ -107,14 +116,6 @@ impl Levels {
             }
         }
         Ok(isas)
-    }
-}
-
-impl FromStr for Levels {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        list(text, str::parse).map(Self)
     }
 }
 
@@ -161,11 +162,7 @@ impl FromStr for ThreadCounts {
 }
 
 /// A width or what suits the instruction set.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum WidthChoice {
-    Auto,
-    Fixed(Width),
-}
+pub type WidthChoice = Choice<Width>;
 
 impl WidthChoice {
     /// The width on an instruction set.
@@ -174,14 +171,6 @@ impl WidthChoice {
             Self::Auto => Width::auto(isa.level()),
             Self::Fixed(width) => width,
         }
-    }
-}
-
-impl FromStr for WidthChoice {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        auto_or(text).map(|fixed| fixed.map_or(Self::Auto, Self::Fixed))
     }
 }
 
@@ -309,8 +298,7 @@ pub fn rays_from(text: &str) -> Result<RaysFrom, String> {
 }
 
 /// Several widths, each once.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Widths(pub Vec<WidthChoice>);
+pub type Widths = Choices<Width>;
 
 impl Widths {
     /// The widths; `None` is what suits the instruction set.
@@ -330,14 +318,6 @@ impl Widths {
     /// The widths on an instruction set, each once: `auto` may be one that is also listed.
     pub fn on(&self, isa: Isa) -> Vec<Width> {
         each_once(self.0.iter().map(|choice| choice.on(isa)))
-    }
-}
-
-impl FromStr for Widths {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        list(text, str::parse).map(Self)
     }
 }
 

@@ -13,7 +13,7 @@ use antumbra_load::set_resolution;
 use antumbra_raster::Quantity;
 use clap::{ArgAction, Args};
 
-use super::command::{Bake, Baking, Done, Figure, text};
+use super::command::{Bake, Baking, Done, Figure};
 use super::files::{self, Format};
 use super::ground::Ground;
 use super::raster;
@@ -21,7 +21,7 @@ use super::view::View;
 use crate::args::{ChunkArgs, PoseArgs, Resolution, SCENE, SCENE_LONG, heading, values};
 use crate::exit::{Failure, tell};
 use crate::json::Destination;
-use crate::output::{self, Files};
+use crate::output::{self, Files, text};
 use crate::{interrupt, scenes};
 
 /// Name of the value in files.
@@ -348,9 +348,8 @@ fn write_mesh(
             files::npz(path, &entries)
         }
         Format::Raster => {
-            let cells = ground.loaded.raster.as_ref().ok_or_else(|| {
-                Failure::Usage(format!("{}: the scene is no raster", path.display()))
-            })?;
+            let cells = ground.loaded.raster.as_ref();
+            let cells = cells.ok_or_else(|| Failure::name(path, "the scene is no raster"))?;
             let quantity = Quantity {
                 name: PROPERTY,
                 unit: "",
@@ -362,8 +361,7 @@ fn write_mesh(
 }
 
 fn write_atlas(args: &AoArgs, atlas: &Atlas, found: &Openness) -> Result<(), Failure> {
-    let extension = args.output[0].extension().unwrap_or_default();
-    let is_exr = extension.eq_ignore_ascii_case("exr");
+    let is_exr = output::is_one_of(&args.output[0], &["exr"]);
     let pixel = |index: usize| match found.bent_normals.get(index) {
         None => [found.open[index]; 3],
         Some(bent) if is_exr => *bent,

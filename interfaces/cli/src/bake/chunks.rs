@@ -63,8 +63,7 @@ pub fn declare(
         return Err(Failure::Usage("--output is missing".into()));
     };
     if shard.is_some() {
-        let extension = first.extension().unwrap_or_default();
-        if outputs.len() != 1 || !extension.eq_ignore_ascii_case(PART) {
+        if outputs.len() != 1 || !output::is_one_of(first, &[PART]) {
             let path = first.display();
             return Err(Failure::Usage(format!(
                 "{path}: a shard is written as one .{PART}, for merge"

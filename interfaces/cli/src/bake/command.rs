@@ -17,7 +17,7 @@ use super::visible::VisibleArgs;
 use crate::args::ChunkArgs;
 use crate::exit::{Failure, tell};
 use crate::json::Destination;
-use crate::output::Files;
+use crate::output::{Files, text};
 use crate::progress::Progress;
 use crate::{input, json, scenes, version};
 
@@ -314,9 +314,4 @@ impl Bake<'_> {
         tell(format_args!("{things}{how}; wrote {wrote}"));
         chunks::forget(done.checkpoint.as_deref());
     }
-}
-
-/// A path as text.
-pub fn text(path: &Path) -> String {
-    path.to_string_lossy().into_owned()
 }

@@ -46,7 +46,7 @@ impl Format {
             Some(&"ply") => Ok(Self::Ply),
             Some(&("tif" | "tiff" | "asc" | "npy")) => Ok(Self::Raster),
             Some(_) => Ok(Self::Picture),
-            None => Err(Failure::Usage(format!("{}: {sentence}", path.display()))),
+            None => Err(Failure::name(path, sentence)),
         }
     }
 }

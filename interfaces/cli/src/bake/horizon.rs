@@ -77,9 +77,8 @@ impl Baking for HorizonArgs {
             }
             places::check_raster(path, &self.places, &self.scene)?;
             if self.azimuths != 1 {
-                let path = path.display();
                 let reason = "a raster has one azimuth: --azimuths 1 with --first";
-                return Err(Failure::Usage(format!("{path}: {reason}")));
+                return Err(Failure::name(path, reason));
             }
         }
         places::check(&self.places)

@@ -38,9 +38,8 @@ pub fn check_raster(path: &Path, args: &PlaceArgs, scene: &Path) -> Result<(), F
     if has_cells {
         return Ok(());
     }
-    let path = path.display();
     let reason = "a raster needs --grid from above, or --cells of a scene that is one";
-    Err(Failure::Usage(format!("{path}: {reason}")))
+    Err(Failure::name(path, reason))
 }
 
 impl PlaceArgs {

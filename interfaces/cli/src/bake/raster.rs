@@ -12,10 +12,7 @@ use crate::output;
 
 /// Whether a scene is a height raster, by its name.
 pub fn is_raster(scene: &Path) -> bool {
-    let extension = scene.extension().unwrap_or_default();
-    EXTENSIONS
-        .iter()
-        .any(|known| extension.eq_ignore_ascii_case(known))
+    output::is_one_of(scene, &EXTENSIONS)
 }
 
 /// Writes values of sensors, which are the vertices of a height raster or the cells of a grid. A unit of the scene has so many
@@ -49,9 +46,8 @@ pub fn write(
             }
         }
         _ => {
-            let path = path.display();
-            let reason = format!("{path}: a raster needs --grid, or a scene that is a raster");
-            return Err(Failure::Usage(reason));
+            let reason = "a raster needs --grid, or a scene that is a raster";
+            return Err(Failure::name(path, reason));
         }
     };
     if let Some(crs) = crs {

@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use crate::args::RenderArgs;
 use crate::exit::{detail, say, tell};
+use crate::output::text;
 use crate::version;
 
 /// The JSON document.
@@ -91,7 +92,6 @@ impl<'a> Document<'a> {
         load_seconds: f64,
     ) -> Self {
         let stats = &rendering.stats;
-        let text = |path: &Path| path.to_string_lossy().into_owned();
         Self {
             schema: "antumbra.render/1",
             machine: version::machine(options.recipe.engine.isa()),

@@ -115,18 +115,10 @@ pub fn check_image_names(image: Option<&Path>, errors: Option<&Path>) -> Result<
 
 /// Refuses a name with another extension than the known ones. Streams need none.
 fn check_name(path: Option<&Path>, known: &[&str], sentence: &str) -> Result<(), Failure> {
-    match path.filter(|path| !is_one_of(path, known) && !output::is_stream(path)) {
-        Some(path) => Err(Failure::Usage(format!("{}: {sentence}", path.display()))),
+    match path.filter(|path| !output::is_one_of(path, known) && !output::is_stream(path)) {
+        Some(path) => Err(Failure::name(path, sentence)),
         None => Ok(()),
     }
-}
-
-/// Whether a path has one of some extensions.
-fn is_one_of(path: &Path, known: &[&str]) -> bool {
-    let extension = path.extension().unwrap_or_default();
-    known
-        .iter()
-        .any(|known| extension.eq_ignore_ascii_case(known))
 }
 
 /// The name that the scene gives its film, or the scene's own, in the current directory; the name of a shard says
@@ -148,7 +140,7 @@ fn default_image(scene: &Scene) -> PathBuf {
     let path = film
         .and_then(Path::file_name)
         .map_or_else(|| file_stem(&scene.name).into(), PathBuf::from);
-    if is_one_of(
+    if output::is_one_of(
         &path,
         &antumbra_image::writable_extensions().collect::<Vec<_>>(),
     ) {

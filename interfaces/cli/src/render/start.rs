@@ -54,6 +54,6 @@ pub fn lesson(args: &RenderArgs, scene: &Scene, order: Order) -> Result<Option<L
         Lesson::from_bytes(&bytes).map_err(|error| Failure::refused(path, &error))?;
     match place.difference(&Place::new(scene)) {
         None => Ok(Some(lesson)),
-        Some(reason) => Err(Failure::Usage(format!("{}: {reason}", path.display()))),
+        Some(reason) => Err(Failure::name(path, reason)),
     }
 }

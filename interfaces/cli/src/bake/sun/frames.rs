@@ -23,16 +23,12 @@ const SECONDS: f32 = 0.2;
 
 /// Whether a file of moving shadows is a .gif; otherwise maps are .png.
 pub fn is_gif(path: &Path) -> Result<bool, Failure> {
-    let extension = path.extension().unwrap_or_default();
-    match ["gif", "png"].map(|known| extension.eq_ignore_ascii_case(known)) {
-        [true, _] => Ok(true),
-        [_, true] => Ok(false),
-        _ => {
-            let path = path.display();
-            Err(Failure::usage(format_args!(
-                "{path}: moving shadows are written as gif or png"
-            )))
-        }
+    match ["gif", "png"].map(|known| output::is_one_of(path, &[known])) {
+        [false, false] => Err(Failure::name(
+            path,
+            "moving shadows are written as gif or png",
+        )),
+        [is_gif, _] => Ok(is_gif),
     }
 }
 

@@ -193,8 +193,7 @@ impl Baking for SunArgs {
         for path in &self.output {
             match Format::of_sensors(path)? {
                 Format::Picture if self.places.grid.is_none() => {
-                    let path = path.display();
-                    return Err(Failure::Usage(format!("{path}: a map needs --grid")));
+                    return Err(Failure::name(path, "a map needs --grid"));
                 }
                 Format::Raster => places::check_raster(path, &self.places, &self.scene)?,
                 _ => {}

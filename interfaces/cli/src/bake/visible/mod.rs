@@ -13,7 +13,7 @@ use antumbra_lab::count;
 use antumbra_raster::{Quantity, unit_name};
 use clap::{ArgGroup, Args};
 
-use super::command::{Bake, Baking, Done, Figure, Named, text};
+use super::command::{Bake, Baking, Done, Figure, Named};
 use super::files::{self, Column, Format};
 use super::ground::{self, Ground};
 use super::map::{self, Plan, Words};
@@ -25,7 +25,7 @@ use crate::args::{
 use crate::exit::{Failure, tell};
 use crate::interrupt;
 use crate::json::Destination;
-use crate::output::Files;
+use crate::output::{Files, text};
 use lines::Ends;
 
 /// Name of the value of viewsheds in files.
@@ -116,20 +116,16 @@ pub struct VisibleArgs {
 
 impl Baking for VisibleArgs {
     fn check(&self) -> Result<(), Failure> {
-        let refuse = |path: &Path, reason: &str| {
-            let path = path.display();
-            Err(Failure::Usage(format!("{path}: {reason}")))
-        };
         let has_cells = self.viewshed && (self.grid.is_some() || raster::is_raster(&self.scene));
         for path in &self.output {
             match Format::of_sensors(path)? {
                 Format::Picture if self.grid.is_none() => {
-                    return refuse(path, "a map needs --viewshed with --grid");
+                    return Err(Failure::name(path, "a map needs --viewshed with --grid"));
                 }
                 Format::Raster if !has_cells => {
                     let reason =
                         "a raster needs --viewshed, with --grid or of a scene that is a raster";
-                    return refuse(path, reason);
+                    return Err(Failure::name(path, reason));
                 }
                 _ => {}
             }
