@@ -150,6 +150,19 @@ macro_rules! exports {
     };
 }
 
+/// Declares a type of handles whose values have a field `device`.
+macro_rules! handle {
+    ($type:ty: $retain:ident $release:ident) => {
+        impl $crate::device::Handle for $type {
+            fn device(&self) -> &Device {
+                &self.device
+            }
+        }
+
+        references! { $type: $retain $release }
+    };
+}
+
 /// Declares the functions that count references to handles of one type.
 macro_rules! references {
     ($type:ty: $retain:ident $release:ident) => {

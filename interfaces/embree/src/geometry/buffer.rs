@@ -5,7 +5,7 @@ use std::ffi::c_void;
 use std::sync::Arc;
 
 use crate::abi::{ErrorCode, format};
-use crate::device::{Device, Failure, Handle, Outcome, give, share};
+use crate::device::{Device, Failure, Outcome, give, share};
 
 /// Alignment of memory of the library.
 const ALIGN: usize = 64;
@@ -25,12 +25,6 @@ pub struct Buffer {
 unsafe impl Send for Buffer {}
 // SAFETY: as above.
 unsafe impl Sync for Buffer {}
-
-impl Handle for Buffer {
-    fn device(&self) -> &Device {
-        &self.device
-    }
-}
 
 impl Buffer {
     /// New memory, filled with zeros.
@@ -201,4 +195,4 @@ exports! {
     }
 }
 
-references! { Buffer: rtcRetainBuffer rtcReleaseBuffer }
+handle! { Buffer: rtcRetainBuffer rtcReleaseBuffer }

@@ -19,7 +19,7 @@ use std::sync::{Arc, Mutex};
 use crate::abi::{
     BoundsFunction, FilterFunction, IntersectFunction, PointFunction, buffer_type, format,
 };
-use crate::device::{Device, Failure, Handle, Outcome, give, lock, share};
+use crate::device::{Device, Failure, Outcome, give, lock, share};
 use crate::scene::Scene;
 pub use buffer::View;
 pub use filters::{Filters, Query};
@@ -36,14 +36,8 @@ pub struct Geometry {
     state: Mutex<State>,
 }
 
-impl Handle for Geometry {
-    fn device(&self) -> &Device {
-        &self.device
-    }
-}
-
 /// All settings of a geometry.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub struct State {
     pub index: Option<View>,
     pub vertices: Option<View>,
@@ -69,24 +63,11 @@ pub struct State {
 impl State {
     fn new() -> Self {
         Self {
-            index: None,
-            vertices: None,
-            normals: None,
-            attributes: Vec::new(),
-            transforms: None,
             mask: 1,
             is_enabled: true,
-            user_count: 0,
             tessellation: 4,
-            bounds: None,
-            intersect: None,
-            occluded: None,
-            point: None,
-            intersect_filter: None,
-            occluded_filter: None,
-            takes_argument_filter: false,
-            scenes: Vec::new(),
             transform: IDENTITY,
+            ..Self::default()
         }
     }
 }
@@ -243,4 +224,4 @@ exports! {
     }
 }
 
-references! { Geometry: rtcRetainGeometry rtcReleaseGeometry }
+handle! { Geometry: rtcRetainGeometry rtcReleaseGeometry }

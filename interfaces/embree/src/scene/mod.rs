@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicPtr, Ordering};
 use std::sync::{Arc, Mutex};
 
 use crate::abi::{Bounds, INVALID, ProgressFunction};
-use crate::device::{Callback, Device, Failure, Handle, Outcome, give, lock, share, share_on};
+use crate::device::{Callback, Device, Failure, Outcome, give, lock, share, share_on};
 use crate::geometry::{Geometry, transform};
 pub use committed::{Committed, Site, Traits};
 pub use user::{Current, report_to_running, with_current};
@@ -29,12 +29,6 @@ pub struct Scene {
     /// The commit before the last one, which a query that should have ended may still use. Held for moments only, and no other
     /// lock is taken meanwhile: scenes may be instances of each other.
     retired: Mutex<Option<Arc<Committed>>>,
-}
-
-impl Handle for Scene {
-    fn device(&self) -> &Device {
-        &self.device
-    }
 }
 
 #[derive(Default)]
@@ -230,4 +224,4 @@ exports! {
     }
 }
 
-references! { Scene: rtcRetainScene rtcReleaseScene }
+handle! { Scene: rtcRetainScene rtcReleaseScene }
