@@ -2,6 +2,9 @@
 //!
 //! Vertices at the same place become one. Facet normals follow from the corners, whatever the file says. Attribute bytes,
 //! in which some programs keep colours in ways of their own, are not read.
+//!
+//! No crate reads the files, because mistakes name the line of a text, and the count of a binary file is compared with its
+//! size before memory is taken.
 
 use std::collections::HashMap;
 use std::path::Path;

@@ -4,7 +4,8 @@
 //! corner, or other triangles if they have inward corners. Points and lines are left out with a note, and everything else
 //! that is not read with a warning.
 //!
-//! The reader is not a crate's: mistakes name line and column, and memory is counted before it is taken.
+//! No crate reads the text, because mistakes name line and column, and memory is counted before it is taken: a face needs
+//! 56 bytes per corner, for example, which a small limit refuses at that line.
 //!
 //! - `scan.rs`: words and numbers with their columns
 //! - `faces.rs`: corners of faces, and the meshes that they make

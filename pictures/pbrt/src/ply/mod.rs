@@ -4,6 +4,9 @@
 //! element gives polygons, and `tristrips` strips of triangles, which -1 ends. Other elements and properties are ignored. Declared counts are compared with
 //! the size of the file before anything is allocated.
 //!
+//! No crate reads the files, because mistakes name the line or the byte, and a header that promises more than the file
+//! holds is refused before memory is taken.
+//!
 //! - `header`: format, elements and properties
 //! - `body`: values, in the order of the header
 
