@@ -33,7 +33,7 @@ fuzz_target!(|bytes: &[u8]| {
     let bvh = Bvh::build(&[], &Recipe::default()).expect("an empty tree");
     let table = "0 0 0\n1 0 0\n0 1 0\n";
     let sensors = Sensors::from_table(table, &Default::default()).expect("a table");
-    let rows = Eyes::new(&sensors, &bvh.bounds(), [0.0, 0.0, 1.0], 0.0);
+    let rows = Eyes::new(&sensors, &bvh, [0.0, 0.0, 1.0], 0.0);
     let job = VisibilityJob {
         rows: &rows,
         columns: None,
