@@ -20,6 +20,10 @@
     clippy::too_many_arguments,
     reason = "C has no slices: an array is an address, a count and a stride"
 )]
+#![allow(
+    rustdoc::broken_intra_doc_links,
+    reason = "the docs are comments of the header, where brackets index arrays"
+)]
 #![allow(missing_docs, reason = "the header describes the fields of structures")]
 
 pub mod arrays;

@@ -3,8 +3,8 @@
 use super::material;
 
 material! {
-    /// Lobes of two materials, scaled and added. Neither is [`Bumped`](super::Bumped) or [`Material::None`]: bump maps apply
-    /// to the whole mixture.
+    /// Lobes of two materials, scaled and added. Neither is [`Bumped`](super::Bumped) or
+    /// [`Material::None`](crate::Material::None): bump maps apply to the whole mixture.
     Mix {
         /// First and second material.
         materials: Materials,
