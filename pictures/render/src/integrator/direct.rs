@@ -253,22 +253,7 @@ impl DirectLighting {
             }
         }
         if step.follow && delta_share > 0.0 {
-            let choice = vertex.dimension(Purpose::Transmission, 0, 0);
-            let choice = vertex.stream.uniform(choice);
-            let lobes = [
-                bsdf.delta_reflection(wo),
-                bsdf.delta_transmission(wo, choice),
-            ];
-            for (side, lobe) in lobes.into_iter().enumerate() {
-                let Some(lobe) = lobe else { continue };
-                let throughput = throughput * lobe.weight;
-                if throughput != Vec3::ZERO {
-                    let ray = surface.ray_along(frame.to_world(lobe.wi));
-                    // Beyond 63 levels places repeat, which correlates values but adds no bias.
-                    let place = place.wrapping_mul(2).wrapping_add(side as u64);
-                    self.next.push(ray, sample, throughput, place);
-                }
-            }
+            vertex.follow(&mut self.next);
         }
     }
 }
@@ -421,6 +406,26 @@ impl Vertex<'_> {
             * (wi.z.abs() * technique / density);
         if brought != Vec3::ZERO {
             shadows.push(found.shadow_ray(self.surface), self.sample, brought);
+        }
+    }
+
+    /// Queues the specular branches.
+    fn follow(&self, next: &mut Branches) {
+        let choice = self.dimension(Purpose::Transmission, 0, 0);
+        let choice = self.stream.uniform(choice);
+        let lobes = [
+            self.bsdf.delta_reflection(self.wo),
+            self.bsdf.delta_transmission(self.wo, choice),
+        ];
+        for (side, lobe) in lobes.into_iter().enumerate() {
+            let Some(lobe) = lobe else { continue };
+            let throughput = self.throughput * lobe.weight;
+            if throughput != Vec3::ZERO {
+                let ray = self.surface.ray_along(self.frame.to_world(lobe.wi));
+                // Beyond 63 levels places repeat, which correlates values but adds no bias.
+                let place = self.place.wrapping_mul(2).wrapping_add(side as u64);
+                next.push(ray, self.sample, throughput, place);
+            }
         }
     }
 

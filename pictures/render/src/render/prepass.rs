@@ -55,10 +55,7 @@ pub fn run(
     let Some(selection) = selection else {
         return Ok((prepass, sum));
     };
-    let samples = job.tiles.window(0).area() as f64 * f64::from(job.spp);
-    let group = ((BATCH as f64 / (samples * selection.share())) as usize).clamp(1, BATCH);
-    // Large jobs make full batches, which may span tiles. Every thread needs some jobs, though.
-    let group = group.min(tiles.div_ceil(4 * rayon::current_num_threads()).max(1));
+    let group = group_size(job, selection);
     let radiance = Mutex::new(std::mem::take(&mut prepass.radiance));
     let moving = job.moving(bvh, observer.is_some())?;
     let jobs = Jobs::new(tiles.div_ceil(group), Phase::Log, job.monitor);
@@ -119,6 +116,14 @@ pub fn run(
         .into_inner()
         .unwrap_or_else(PoisonError::into_inner);
     Ok((prepass, sum))
+}
+
+/// Number of tiles of one job of a thread.
+fn group_size(job: &Job, selection: Selection) -> usize {
+    let samples = job.tiles.window(0).area() as f64 * f64::from(job.spp);
+    let group = ((BATCH as f64 / (samples * selection.share())) as usize).clamp(1, BATCH);
+    // Large jobs make full batches, which may span tiles. Every thread needs some jobs, though.
+    group.min((job.todo.len().div_ceil(4 * rayon::current_num_threads())).max(1))
 }
 
 /// Samples to be traced together, and finished samples of the job.

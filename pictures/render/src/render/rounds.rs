@@ -104,12 +104,12 @@ fn rounds(
     let live = job.monitor.tiles();
     let live = live.filter(|live| live.window() == job.rules.window);
     let tiles = job.tiles.count();
-    let size = (tiles / (4 * rayon::current_num_threads())).clamp(1, GROUP);
-    let anew = |index| {
-        let window = job.tiles.window(index);
-        (index, TileWork::new(job.rules, window, options.cost_map))
-    };
     if growth.groups.is_empty() {
+        let size = (tiles / (4 * rayon::current_num_threads())).clamp(1, GROUP);
+        let anew = |index| {
+            let window = job.tiles.window(index);
+            (index, TileWork::new(job.rules, window, options.cost_map))
+        };
         growth.groups = (0..tiles)
             .step_by(size)
             .map(|first| Mutex::new((first..tiles.min(first + size)).map(anew).collect()))
@@ -145,15 +145,11 @@ fn rounds(
             };
             while let Some(turn) = jobs.take() {
                 let mut group = groups[turn].lock().unwrap_or_else(PoisonError::into_inner);
-                // Small batches are slow, and large ones take memory.
-                let together = (BATCH / (256 * depth as usize)).max(1);
                 // A cancelled round has given the first tiles of a group their samples.
                 let done = round.samples + depth;
                 let first = group.partition_point(|(_, tile)| tile.done >= done);
-                for tiles in group[first..].chunks_mut(together) {
-                    if thread.batch(tiles, depth).is_none() {
-                        return thread.tracer.take_counts();
-                    }
+                if thread.batches(&mut group[first..], depth).is_none() {
+                    return thread.tracer.take_counts();
                 }
                 jobs.finish();
             }
@@ -172,18 +168,25 @@ fn rounds(
             .progress(Phase::Render, round.samples.into(), job.spp.into());
         after(round);
     }
-    let mut film = Film::new(job.rules);
-    for group in std::mem::take(growth).groups {
-        let tiles = group.into_inner().unwrap_or_else(PoisonError::into_inner);
-        for (index, tile) in tiles {
-            film.finish(index, tile.film);
-        }
-    }
-    let image = film.image(job.world.film.resolution)?;
+    let image = std::mem::take(growth).image(job)?;
     if let Some(live) = live {
         live.complete(&image, |_| true);
     }
     Ok(image)
+}
+
+impl Growth {
+    /// Picture of all tiles.
+    fn image(self, job: &Job) -> Result<Image, Error> {
+        let mut film = Film::new(job.rules);
+        for group in self.groups {
+            let tiles = group.into_inner().unwrap_or_else(PoisonError::into_inner);
+            for (index, tile) in tiles {
+                film.finish(index, tile.film);
+            }
+        }
+        film.image(job.world.film.resolution)
+    }
 }
 
 /// A monitor that hears nothing of single tiles.
@@ -208,6 +211,14 @@ struct Thread<'a> {
 }
 
 impl Thread<'_> {
+    /// Gives every pixel of tiles `depth` more samples, some tiles at a time. `None` when cancelled: the rest has none.
+    fn batches(&mut self, tiles: &mut [(usize, TileWork)], depth: u32) -> Option<()> {
+        // Small batches are slow, and large ones take memory.
+        let together = (BATCH / (256 * depth as usize)).max(1);
+        let mut batches = tiles.chunks_mut(together);
+        batches.try_for_each(|tiles| self.batch(tiles, depth))
+    }
+
     /// Gives every pixel of some tiles `depth` more samples. `None` when cancelled: no sample was added.
     fn batch(&mut self, tiles: &mut [(usize, TileWork)], depth: u32) -> Option<()> {
         let job = self.job;

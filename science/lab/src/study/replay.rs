@@ -215,22 +215,10 @@ impl<'a> Bench<'a> {
         };
         self.oracle = Some((*replay, oracle));
         let ordered = collapsed.order(replay.combination.order)?;
-        let (mut answers, costs) = counted(&ordered.bvh, rays);
-        let mut equal_answers = answers == reference.answers;
-        let mut speeds = [0.0; ROUNDS];
-        let mut seconds = [0.0; ROUNDS];
-        for (speed, seconds) in speeds.iter_mut().zip(&mut seconds) {
-            let mut times = [0.0; 2];
-            for (bvh, time) in [&reference.bvh, &ordered.bvh].into_iter().zip(&mut times) {
-                let start = thread_time::seconds();
-                bvh.batch(rays).on_this_thread().occluded_into(&mut answers);
-                *time = (thread_time::seconds() - start).max(1e-9);
-                equal_answers &= answers == reference.answers;
-            }
-            (*speed, *seconds) = (times[0] / times[1], times[1]);
-        }
-        speeds.sort_unstable_by(f64::total_cmp);
-        seconds.sort_unstable_by(f64::total_cmp);
+        let (answers, costs) = counted(&ordered.bvh, rays);
+        let trees = [&reference.bvh, &ordered.bvh];
+        let ([speeds, seconds], equal) = timed(trees, rays, &reference.answers);
+        let equal_answers = equal && answers == reference.answers;
         let mean = |tests: fn(&Cost) -> u32, chosen: Option<bool>| {
             let of = costs.iter().zip(&answers);
             let of = of.filter(|(_, occluded)| chosen.is_none_or(|chosen| **occluded == chosen));
@@ -270,6 +258,28 @@ impl<'a> Bench<'a> {
         self.reference = Some(reference);
         Ok(row)
     }
+}
+
+/// Speeds of the second of two trees over the first, and its seconds, each from the least: CPU time of interleaved rounds. Then
+/// whether all answers were as expected.
+fn timed(trees: [&Bvh; 2], rays: &[Ray], expected: &[bool]) -> ([[f64; ROUNDS]; 2], bool) {
+    let mut found = [[0.0; ROUNDS]; 2];
+    let mut answers = vec![false; rays.len()];
+    let mut equal = true;
+    for round in 0..ROUNDS {
+        let [first, second] = trees.map(|bvh| {
+            let start = thread_time::seconds();
+            bvh.batch(rays).on_this_thread().occluded_into(&mut answers);
+            let seconds = (thread_time::seconds() - start).max(1e-9);
+            equal &= answers == expected;
+            seconds
+        });
+        (found[0][round], found[1][round]) = (first / second, second);
+    }
+    for sorted in &mut found {
+        sorted.sort_unstable_by(f64::total_cmp);
+    }
+    (found, equal)
 }
 
 impl Reference {

@@ -158,6 +158,23 @@ pub struct Meeting<'a> {
     pub from_camera: bool,
 }
 
+impl Meeting<'_> {
+    /// Adds the emission that the paths hit.
+    fn emit(&self, batch: &mut Batch) {
+        let block = self.hits.block();
+        for (lane, &place) in self.places.iter().enumerate() {
+            let state = &self.current.states[place as usize];
+            let shape = block.hit[lane].shape as usize;
+            let emitted = if self.world.lights.emitter(shape).is_some() {
+                emitted_light(self.world, &state.origin, &block.surface(lane))
+            } else {
+                Vec3::ZERO
+            };
+            batch.emitted[state.sample as usize] += state.throughput * emitted;
+        }
+    }
+}
+
 impl Vertices {
     /// Number of lanes with a hit.
     pub fn count(&self) -> usize {
@@ -210,26 +227,18 @@ impl Vertices {
         self.others.clear();
         self.made.clear();
         let surfaces = block.columns();
-        if !meeting.ends {
-            run(isa, Turn(surfaces), &mut self.local);
-            run(isa, Face(surfaces), asked);
+        meeting.emit(batch);
+        if meeting.ends {
+            return;
         }
+        run(isa, Turn(surfaces), &mut self.local);
+        run(isa, Face(surfaces), asked);
         for (lane, &place) in places.iter().enumerate() {
             let index = place as usize;
             let state = &current.states[index];
             let (sample, throughput) = (state.sample, state.throughput);
-            let shape = block.hit[lane].shape as usize;
-            let emitted = if world.lights.emitter(shape).is_some() {
-                emitted_light(world, &state.origin, &block.surface(lane))
-            } else {
-                Vec3::ZERO
-            };
-            batch.emitted[sample as usize] += throughput * emitted;
             (self.is_lambert[lane], asked.wants[lane]) = (0, 0);
-            if meeting.ends {
-                continue;
-            }
-            let material = world.shapes[shape].material;
+            let material = world.shapes[block.hit[lane].shape as usize].material;
             let bsdf = match &world.materials[material] {
                 Material::None => {
                     current.go_through(index, &block.surface(lane), through);
