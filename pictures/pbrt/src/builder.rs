@@ -26,6 +26,7 @@ use glam::{DMat4, DVec3};
 use crate::arguments::Matrix;
 use crate::budget::Budget;
 use crate::directive::{Directive, Handler, Phase};
+use crate::lookup::read;
 use crate::mesh_file::PendingMeshes;
 use crate::report::Report;
 use crate::source::Span;
@@ -246,21 +247,29 @@ impl Handler for Builder<'_> {
             D::TransformTimes(times) => self.transform_times(at, times, report),
             D::Camera(kind, params) => self.camera(at, &kind, &params, report),
             D::Film(kind, params) => {
-                (self.film, self.film_diagonal) = film::declare(at, &kind, &params, report);
+                (self.film, self.film_diagonal) =
+                    read("film", at, (&kind, &params), report, film::film);
             }
             D::PixelFilter(kind, params) => {
-                self.filter = film::declare_filter(at, &kind, &params, report);
+                self.filter = read("pixel filter", at, (&kind, &params), report, film::filter);
             }
             D::Sampler(kind, params) => {
-                self.sampler = settings::declare_sampler(at, &kind, &params, report);
+                self.sampler = read("sampler", at, (&kind, &params), report, settings::sampler);
             }
             D::Integrator(kind, params) => {
-                self.integrator = settings::declare_integrator(at, &kind, &params, report);
+                self.integrator = read(
+                    "integrator",
+                    at,
+                    (&kind, &params),
+                    report,
+                    settings::integrator,
+                );
             }
             D::Accelerator(kind, params) => {
                 let orders = self.options.orders;
-                self.accelerator =
-                    settings::declare_accelerator(at, &kind, &params, orders, report);
+                self.accelerator = read("accelerator", at, (&kind, &params), report, |lookup| {
+                    settings::accelerator(lookup, orders)
+                });
             }
             D::WorldBegin() => self.world_begin(),
             D::WorldEnd() => self.world_end(report),
@@ -298,7 +307,8 @@ impl Handler for Builder<'_> {
             D::NamedMaterial(name) => self.named_material(&name, report),
             D::LightSource(kind, params) => self.light(at, &kind, &params, report),
             D::AreaLightSource(kind, params) => {
-                self.state.now.area_light = light::declare_area(at, &kind, &params, report);
+                self.state.now.area_light =
+                    read("area light", at, (&kind, &params), report, light::area);
             }
             D::Shape(kind, params) => self.shape(at, &kind, &params, report),
             D::ReverseOrientation() => self.state.now.reverse_orientation ^= true,

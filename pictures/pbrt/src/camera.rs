@@ -7,11 +7,7 @@ mod lens;
 use antumbra_scene::{Camera, Projection};
 use glam::{DMat4, DVec3, DVec4, Mat3A, Mat4};
 
-use crate::directive::Quoted;
-use crate::lookup::Lookup;
-use crate::params::{ParamType, Params};
-use crate::report::Report;
-use crate::source::Span;
+use crate::lookup::{FLOAT, Lookup, NOT_NEGATIVE, POSITIVE};
 use crate::state::{MIRRORS, MIRRORS_HELP, Transforms};
 use crate::transform;
 
@@ -21,94 +17,95 @@ pub(crate) const SUPPORTED: &[&str] = &["environment", "orthographic", "perspect
 /// Supported cameras of pbrt-v4.
 const SUPPORTED4: &[&str] = &["environment", "orthographic", "perspective", "spherical"];
 
-/// Handles `Camera`. Returns the camera, which is measured from `origin`, and, in double precision, camera to world space at
+/// Reads a `Camera`. Returns the camera, which is measured from `origin`, and, in double precision, camera to world space at
 /// the start and at the end of the exposure.
-pub(crate) fn declare(
-    at: Span,
-    kind: &Quoted,
-    params: &Params,
-    (transforms, origin): (&Transforms, DVec3),
-    report: &mut Report,
+pub(crate) fn read(
+    lookup: &mut Lookup,
+    transforms: &Transforms,
+    origin: DVec3,
 ) -> (Camera, [DMat4; 2]) {
-    let mut lookup = Lookup::new(at, format!("camera {:?}", kind.text), params);
-    let (matrix, start) = world_from_camera_of(at, transforms.start, origin, report);
-    let mut places = [start; 2];
-    let mut end = None;
-    if transforms.is_animated() {
-        let (moved, place) = world_from_camera_of(at, transforms.end, origin, report);
-        places[1] = place;
-        if transforms.mirror_differently() {
-            report.error_help(at, MIRRORS, MIRRORS_HELP);
-        } else if [transforms.start, transforms.end]
-            .iter()
-            .any(|matrix| matrix.row(3) != DVec4::W)
-        {
-            report.unsupported(at, "a moving camera under a perspective transformation is");
-        } else {
-            end = (moved != matrix).then_some(moved);
-        }
+    let (matrix, start) = world_from_camera_of(lookup, transforms.start, origin);
+    let (end, place) = match transforms.is_animated() {
+        true => moved(lookup, transforms, origin, &matrix),
+        false => (None, start),
+    };
+    let camera = Camera {
+        world_from_camera: matrix,
+        end,
+        ..of_kind(lookup)
+    };
+    (camera, [start, place])
+}
+
+/// Camera to world space at the end of the exposure, in single precision where it differs from that at the start, `matrix`.
+fn moved(
+    lookup: &mut Lookup,
+    transforms: &Transforms,
+    origin: DVec3,
+    matrix: &Mat4,
+) -> (Option<Mat4>, DMat4) {
+    let (moved, place) = world_from_camera_of(lookup, transforms.end, origin);
+    let ends = [transforms.start, transforms.end];
+    if transforms.mirror_differently() {
+        lookup.error_help(MIRRORS, MIRRORS_HELP);
+    } else if ends.iter().any(|matrix| matrix.row(3) != DVec4::W) {
+        lookup.unsupported("a moving camera under a perspective transformation is");
+    } else {
+        return ((moved != *matrix).then_some(moved), place);
     }
-    let mut camera = Camera::default();
-    match kind.text.as_str() {
-        "perspective" => camera = perspective(&mut lookup, report),
+    (None, place)
+}
+
+/// Reads the parameters of a camera by its kind.
+fn of_kind(lookup: &mut Lookup) -> Camera {
+    let is_version4 = lookup.is_version4();
+    let projection = match lookup.kind.text.as_str() {
+        "perspective" => return perspective(lookup),
         "orthographic" => {
-            let plane = plane(&mut lookup, report);
-            camera = Camera {
+            return Camera {
                 projection: Projection::Orthographic,
-                ..plane
+                ..plane(lookup)
             };
         }
-        "environment" => {
-            // As in pbrt-v3, which reads the others without effect.
-            camera.shutter = plane(&mut lookup, report).shutter;
-            camera.projection = Projection::Spherical;
+        "realistic" if !is_version4 => return lens::realistic(lookup),
+        "environment" => Projection::Spherical,
+        "spherical" if is_version4 => {
+            let mappings = [
+                ("equalarea", Projection::EqualArea),
+                ("equirectangular", Projection::Spherical),
+            ];
+            lookup.choice("mapping", mappings)
         }
-        "spherical" if report.is_version4 => {
-            camera.shutter = plane(&mut lookup, report).shutter;
-            camera.projection = lookup.choice(
-                "mapping",
-                [
-                    ("equalarea", Projection::EqualArea),
-                    ("equirectangular", Projection::Spherical),
-                ],
-                report,
-            );
-        }
-        "realistic" if report.is_version4 => {
-            report.unsupported_kind(kind.span, "camera", "realistic", SUPPORTED4);
+        "realistic" => {
+            let span = lookup.kind.span;
+            (lookup.report).unsupported_kind(span, "camera", "realistic", SUPPORTED4);
             lookup.ignore_all();
+            return Camera::default();
         }
-        "realistic" => camera = lens::realistic(&mut lookup, report),
-        name => {
-            let known = match report.is_version4 {
-                true => SUPPORTED4,
-                false => SUPPORTED,
-            };
-            report.unknown(kind.span, "camera", name, known);
-            lookup.ignore_all();
+        _ => {
+            lookup.unknown(if is_version4 { SUPPORTED4 } else { SUPPORTED });
+            return Camera::default();
         }
+    };
+    // As in pbrt-v3, which reads the others without effect.
+    Camera {
+        shutter: plane(lookup).shutter,
+        projection,
+        ..Camera::default()
     }
-    lookup.finish(report);
-    camera.world_from_camera = matrix;
-    camera.end = end;
-    (camera, places)
 }
 
 /// Camera to world space, twice: in single precision, measured from `origin`, and in double precision, as in the file.
 fn world_from_camera_of(
-    at: Span,
+    lookup: &mut Lookup,
     camera_from_world: DMat4,
     origin: DVec3,
-    report: &mut Report,
 ) -> (Mat4, DMat4) {
     let world_from_camera = if transform::is_invertible(&camera_from_world) {
         camera_from_world.inverse()
     } else {
-        report.error_help(
-            at,
-            "the transformation in force here cannot be inverted",
-            "no factor of a Scale may be 0",
-        );
+        let message = "the transformation in force here cannot be inverted";
+        lookup.error_help(message, "no factor of a Scale may be 0");
         DMat4::IDENTITY
     };
     let mut matrix = world_from_camera;
@@ -117,79 +114,66 @@ fn world_from_camera_of(
     let determinant = Mat3A::from_mat4(matrix).determinant();
     if !matrix.is_finite() || !determinant.is_finite() || determinant == 0.0 {
         // Camera rays are computed in single precision.
-        report.error_help(
-            at,
-            format!(
-                "the camera to world transformation in force here cannot be used in single precision: its \
-                 determinant is {determinant}"
-            ),
+        let message = format!(
+            "the camera to world transformation in force here cannot be used in single precision: its \
+             determinant is {determinant}"
+        );
+        lookup.error_help(
+            message,
             "the factors of a Scale must not be so small or so large",
         );
     }
     (matrix, world_from_camera)
 }
 
-fn perspective(lookup: &mut Lookup, report: &mut Report) -> Camera {
-    let plane = plane(lookup, report);
+fn perspective(lookup: &mut Lookup) -> Camera {
+    let plane = plane(lookup);
     // A positive "halffov" takes precedence over "fov", as in pbrt.
-    let half = lookup.float("halffov", -1.0, report);
-    let full = lookup.float("fov", plane.fov, report);
+    let half = lookup.float("halffov", -1.0);
+    let full = lookup.float("fov", plane.fov);
     let fov = if half > 0.0 { 2.0 * half } else { full };
     if !(fov > 0.0 && fov < 180.0) {
         let name = if half > 0.0 { "halffov" } else { "fov" };
-        let place = lookup
-            .find(name, &[ParamType::Float])
-            .map_or(lookup.at, |param| param.value);
-        report.error(
-            place,
-            format!("a field of view of {fov} degrees is not between 0 and 180"),
-        );
+        let found = lookup.find(name, FLOAT);
+        let place = found.map_or(lookup.at, |param| param.value);
+        let message = format!("a field of view of {fov} degrees is not between 0 and 180");
+        lookup.report.error(place, message);
     }
     Camera { fov, ..plane }
 }
 
 /// Shutter, screen window and lens, which cameras share.
-fn plane(lookup: &mut Lookup, report: &mut Report) -> Camera {
+fn plane(lookup: &mut Lookup) -> Camera {
     let defaults = Camera::default();
-    let shutter = shutter(lookup, report);
-    let screen_window = lookup.floats::<4>("screenwindow", report);
+    let shutter = shutter(lookup);
+    let screen_window = lookup.floats::<4>("screenwindow");
     if let Some(window @ [x0, x1, y0, y1]) = screen_window
         && (x0 == x1 || y0 == y1)
     {
-        let message = format!("the screen window {window:?} is empty");
-        report.error(lookup.at, message);
+        lookup.error(format!("the screen window {window:?} is empty"));
     }
-    let aspect = [f32::MIN_POSITIVE, f32::MAX];
     let has_aspect = lookup.has("frameaspectratio");
-    let frame_aspect_ratio = lookup.float_in("frameaspectratio", 1.0, aspect, report);
+    let frame_aspect_ratio = lookup.float_in("frameaspectratio", 1.0, POSITIVE);
     Camera {
         shutter,
         screen_window,
         frame_aspect_ratio: has_aspect.then_some(frame_aspect_ratio),
-        lens_radius: lookup.float_in("lensradius", 0.0, [0.0, f32::MAX], report),
-        focal_distance: lookup.float_in(
-            "focaldistance",
-            defaults.focal_distance,
-            [f32::MIN_POSITIVE, f32::MAX],
-            report,
-        ),
+        lens_radius: lookup.float_in("lensradius", 0.0, NOT_NEGATIVE),
+        focal_distance: lookup.float_in("focaldistance", defaults.focal_distance, POSITIVE),
         ..defaults
     }
 }
 
 /// Times at which the shutter opens and closes.
-fn shutter(lookup: &mut Lookup, report: &mut Report) -> [f32; 2] {
+fn shutter(lookup: &mut Lookup) -> [f32; 2] {
     let [open, close] = Camera::default().shutter;
     let mut shutter = [
-        lookup.float("shutteropen", open, report),
-        lookup.float("shutterclose", close, report),
+        lookup.float("shutteropen", open),
+        lookup.float("shutterclose", close),
     ];
     // In version 4 they were refused with the exposure.
-    if shutter[1] < shutter[0] && !report.is_version4 {
-        report.note(
-            lookup.at,
-            "the shutter closes before it opens: the times are exchanged",
-        );
+    if shutter[1] < shutter[0] && !lookup.is_version4() {
+        lookup.note("the shutter closes before it opens: the times are exchanged");
         shutter.reverse();
     }
     shutter

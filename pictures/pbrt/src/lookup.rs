@@ -1,12 +1,13 @@
 //! Typed lookup of a directive's parameters.
 //!
 //! Every lookup is remembered. At the end, [`Lookup::finish`] reports parameters that the directive does not have, and
-//! parameters of another type, without a separate table of parameters.
+//! parameters of another type, without a separate table of parameters. Mistakes go to the report that the lookup holds.
 
 use antumbra_scene::Rgb;
 use glam::DVec3;
 
-use crate::params::{Param, ParamType, Params, Values};
+use crate::directive::Quoted;
+use crate::params::{Param, ParamType, Params};
 use crate::report::Report;
 use crate::source::Span;
 use crate::spectrum;
@@ -20,12 +21,23 @@ pub(crate) const COLOR: &[ParamType] = &[
     ParamType::Blackbody,
 ];
 
+/// Types of parameters with one number, integer or string.
+pub(crate) const FLOAT: &[ParamType] = &[ParamType::Float];
+pub(crate) const INTEGER: &[ParamType] = &[ParamType::Integer];
+pub(crate) const STRING: &[ParamType] = &[ParamType::String];
+
+/// Numbers above 0, and numbers from 0, for [`Lookup::float_in`].
+pub(crate) const POSITIVE: [f32; 2] = [f32::MIN_POSITIVE, f32::MAX];
+pub(crate) const NOT_NEGATIVE: [f32; 2] = [0.0, f32::MAX];
+
 /// Lookups in one parameter list, and perhaps in a second list with defaults from another directive.
 pub(crate) struct Lookup<'a> {
     /// Place of the directive's name, where missing parameters are reported.
     pub at: Span,
-    /// Owner of the parameters, for messages: `shape "sphere"`.
-    what: String,
+    pub report: &'a mut Report,
+    /// Word for what the directive makes, such as `shape`, and its name in the file.
+    noun: &'static str,
+    pub kind: &'a Quoted,
     params: &'a Params,
     fallback: Option<&'a Params>,
     used: Vec<bool>,
@@ -34,10 +46,18 @@ pub(crate) struct Lookup<'a> {
 
 impl<'a> Lookup<'a> {
     /// Starts the lookups of a directive.
-    pub fn new(at: Span, what: impl Into<String>, params: &'a Params) -> Self {
+    pub fn new(
+        noun: &'static str,
+        at: Span,
+        kind: &'a Quoted,
+        params: &'a Params,
+        report: &'a mut Report,
+    ) -> Self {
         Self {
             at,
-            what: what.into(),
+            report,
+            noun,
+            kind,
             params,
             fallback: None,
             used: vec![false; params.list.len()],
@@ -50,9 +70,56 @@ impl<'a> Lookup<'a> {
         self.fallback = Some(fallback);
     }
 
-    /// Owner of the parameters, for messages.
-    pub fn what(&self) -> &str {
-        &self.what
+    /// Owner of the parameters, for messages: `shape "sphere"`.
+    pub fn what(&self) -> String {
+        format!("{} {:?}", self.noun, self.kind.text)
+    }
+
+    /// Whether the scene is of pbrt-v4.
+    pub fn is_version4(&self) -> bool {
+        self.report.is_version4
+    }
+
+    /// Records a mistake at the directive's name.
+    pub fn error(&mut self, message: impl Into<String>) {
+        self.report.error(self.at, message);
+    }
+
+    /// Records a mistake at the directive's name and what would be right.
+    pub fn error_help(&mut self, message: impl Into<String>, help: &str) {
+        self.report.error_help(self.at, message, help);
+    }
+
+    /// Records a mistake at the directive's name, in place of a value.
+    pub fn fail<T>(&mut self, message: impl Into<String>) -> Option<T> {
+        self.report.fail(self.at, message)
+    }
+
+    /// Records a mistake at the directive's name and what would be right, in place of a value.
+    pub fn fail_help<T>(&mut self, message: impl Into<String>, help: &str) -> Option<T> {
+        self.report.fail_help(self.at, message, help)
+    }
+
+    /// Records a note at the directive's name.
+    pub fn note(&mut self, message: impl Into<String>) {
+        self.report.note(self.at, message);
+    }
+
+    /// Records the use of an unsupported feature at the directive's name.
+    pub fn unsupported(&mut self, feature: impl Into<String>) {
+        self.report.unsupported(self.at, feature);
+    }
+
+    /// Records the use of an unsupported feature at the directive's name, in place of a value.
+    pub fn refuse<T>(&mut self, feature: impl Into<String>) -> Option<T> {
+        self.unsupported(feature);
+        None
+    }
+
+    /// Reports that the directive's name is none of the `known`, and reads no parameters.
+    pub fn unknown(&mut self, known: &[&str]) {
+        (self.report).unknown(self.kind.span, self.noun, &self.kind.text, known);
+        self.ignore_all();
     }
 
     /// Finds a parameter by name and type. Earlier types take precedence.
@@ -67,10 +134,8 @@ impl<'a> Lookup<'a> {
         }
         let fallback = self.fallback?;
         types.iter().find_map(|param_type| {
-            fallback
-                .list
-                .iter()
-                .find(|p| p.name == name && p.param_type == *param_type)
+            let mut list = fallback.list.iter();
+            list.find(|p| p.name == name && p.param_type == *param_type)
         })
     }
 
@@ -79,30 +144,22 @@ impl<'a> Lookup<'a> {
         self.params.list.iter().any(|p| p.name == name)
     }
 
-    /// Finds a parameter that must be given. `written` is its type as the advice has it.
-    pub fn needed(
-        &mut self,
-        name: &'static str,
-        types: &'static [ParamType],
-        written: &str,
-        report: &mut Report,
-    ) -> Option<&'a Param> {
+    /// Finds a parameter that must be given.
+    pub fn needed(&mut self, name: &'static str, types: &'static [ParamType]) -> Option<&'a Param> {
         let found = self.find(name, types);
         if found.is_none() {
-            self.report_missing(name, written, report);
+            self.report_missing(name, types[0].name());
         }
         found
     }
 
     /// Reports that a parameter is missing, unless there is one of another type. Parameters of a wrong type and broken ones are
     /// reported elsewhere.
-    pub fn report_missing(&self, name: &str, param_type: &str, report: &mut Report) {
+    pub fn report_missing(&mut self, name: &str, param_type: &str) {
         if !self.has(name) {
-            report.error_help(
-                self.at,
-                format!("{} needs a parameter {name:?}", self.what),
-                format!("add \"{param_type} {name}\""),
-            );
+            let message = format!("{} needs a parameter {name:?}", self.what());
+            let help = format!("add \"{param_type} {name}\"");
+            self.report.error_help(self.at, message, help);
         }
     }
 
@@ -112,20 +169,23 @@ impl<'a> Lookup<'a> {
     }
 
     /// Reports every parameter that was not used.
-    pub fn finish(self, report: &mut Report) {
+    pub fn finish(self) {
         for (param, used) in self.params.list.iter().zip(&self.used) {
             if !used && !param.is_attribute {
-                self.report_unused(param, report);
+                let (message, help) = self.unused(param);
+                self.report.add_error(param.declaration, message, help);
             }
         }
     }
 
-    fn report_unused(&self, param: &Param, report: &mut Report) {
-        let mut wanted: Vec<ParamType> = Vec::new();
-        for (_, types) in self.asked.iter().filter(|(name, _)| *name == param.name) {
+    /// Message and help about a parameter that was not used.
+    fn unused(&self, param: &Param) -> (String, Option<String>) {
+        let (name, found) = (&param.name, param.param_type.name());
+        let mut wanted: Vec<&str> = Vec::new();
+        for (_, types) in self.asked.iter().filter(|(asked, _)| asked == name) {
             for param_type in *types {
-                if !wanted.contains(param_type) {
-                    wanted.push(*param_type);
+                if !wanted.contains(&param_type.name()) {
+                    wanted.push(param_type.name());
                 }
             }
         }
@@ -133,206 +193,136 @@ impl<'a> Lookup<'a> {
             let mut known: Vec<&str> = self.asked.iter().map(|(name, _)| *name).collect();
             known.sort_unstable();
             known.dedup();
-            report.error_help(
-                param.declaration,
-                format!("{} has no parameter {:?}", self.what, param.name),
-                suggest::help(&param.name, &known),
-            );
-        } else if wanted.contains(&param.param_type) {
-            report.error(
-                param.declaration,
-                format!(
-                    "parameter {:?} is given in two ways; remove one",
-                    param.name
-                ),
-            );
-        } else {
-            let names: Vec<&str> = wanted.iter().map(|t| t.name()).collect();
-            report.error_help(
-                param.declaration,
-                format!(
-                    "parameter {:?} of {} is of type {}, found type {}",
-                    param.name,
-                    self.what,
-                    names.join(" or "),
-                    param.param_type.name()
-                ),
-                format!("write \"{} {}\"", names[0], param.name),
-            );
+            let message = format!("{} has no parameter {name:?}", self.what());
+            return (message, Some(suggest::help(name, &known)));
         }
+        if wanted.contains(&found) {
+            let message = format!("parameter {name:?} is given in two ways; remove one");
+            return (message, None);
+        }
+        let (what, types) = (self.what(), wanted.join(" or "));
+        let message =
+            format!("parameter {name:?} of {what} is of type {types}, found type {found}");
+        (message, Some(format!("write \"{} {name}\"", wanted[0])))
+    }
+
+    /// Value of a parameter, if it is given and `read` reports no mistake.
+    fn value<T>(
+        &mut self,
+        name: &'static str,
+        types: &'static [ParamType],
+        read: impl FnOnce(&'a Param, &mut Report) -> Option<T>,
+    ) -> Option<T> {
+        let param = self.find(name, types)?;
+        read(param, self.report)
     }
 
     /// Single finite number, or the default.
-    pub fn float(&mut self, name: &'static str, default: f32, report: &mut Report) -> f32 {
-        self.optional_float(name, report).unwrap_or(default)
+    pub fn float(&mut self, name: &'static str, default: f32) -> f32 {
+        self.optional_float(name).unwrap_or(default)
     }
 
     /// Single finite number, if it is given.
-    pub fn optional_float(&mut self, name: &'static str, report: &mut Report) -> Option<f32> {
-        let param = self.find(name, &[ParamType::Float])?;
-        one_float(param, report)
+    pub fn optional_float(&mut self, name: &'static str) -> Option<f32> {
+        self.value(name, FLOAT, one_float)
     }
 
     /// Single number within inclusive limits, or the default.
     ///
     /// `f32::MIN_POSITIVE` means "above 0", and `f32::MAX` means no upper limit.
-    pub fn float_in(
-        &mut self,
-        name: &'static str,
-        default: f32,
-        [low, high]: [f32; 2],
-        report: &mut Report,
-    ) -> f32 {
-        let Some(param) = self.find(name, &[ParamType::Float]) else {
-            return default;
-        };
-        match one_float(param, report) {
-            Some(value) if (low..=high).contains(&value) => value,
-            Some(value) => {
-                report.error(
-                    param.value,
-                    format!("{name:?} must be {}, found {value}", range_text(low, high)),
-                );
-                default
+    pub fn float_in(&mut self, name: &'static str, default: f32, [low, high]: [f32; 2]) -> f32 {
+        let read = |param: &Param, report: &mut Report| {
+            let value = one_float(param, report)?;
+            if (low..=high).contains(&value) {
+                return Some(value);
             }
-            None => default,
-        }
+            let range = range_text(low, high);
+            report.fail(
+                param.value,
+                format!("{name:?} must be {range}, found {value}"),
+            )
+        };
+        self.value(name, FLOAT, read).unwrap_or(default)
     }
 
     /// Exactly `N` finite numbers, if they are given.
-    pub fn floats<const N: usize>(
-        &mut self,
-        name: &'static str,
-        report: &mut Report,
-    ) -> Option<[f32; N]> {
-        let param = self.find(name, &[ParamType::Float])?;
-        let Values::Floats(values) = &param.values else {
-            return None;
+    pub fn floats<const N: usize>(&mut self, name: &'static str) -> Option<[f32; N]> {
+        let param = self.find(name, FLOAT)?;
+        let values = param.values.floats()?;
+        let message = match <[f32; N]>::try_from(values) {
+            Ok(values) if values.iter().all(|v| v.is_finite()) => return Some(values),
+            Ok(_) => format!("{name:?} must be finite"),
+            Err(_) => format!("{name:?} takes {N} values, found {}", values.len()),
         };
-        match <[f32; N]>::try_from(values.as_slice()) {
-            Ok(values) if values.iter().all(|v| v.is_finite()) => Some(values),
-            Ok(_) => {
-                report.error(param.list, format!("{name:?} must be finite"));
-                None
-            }
-            Err(_) => {
-                let found = values.len();
-                report.error(
-                    param.list,
-                    format!("{name:?} takes {N} values, found {found}"),
-                );
-                None
-            }
-        }
+        self.report.fail(param.list, message)
     }
 
     /// Single integer of at least `least`, or the default.
-    pub fn integer_from(
-        &mut self,
-        name: &'static str,
-        default: u32,
-        least: u32,
-        report: &mut Report,
-    ) -> u32 {
-        self.integer_in(name, default, [least, i32::MAX as u32], report)
+    pub fn integer_from(&mut self, name: &'static str, default: u32, least: u32) -> u32 {
+        self.integer_in(name, default, [least, i32::MAX as u32])
     }
 
     /// Single integer within inclusive limits, or the default.
-    pub fn integer_in(
-        &mut self,
-        name: &'static str,
-        default: u32,
-        [least, most]: [u32; 2],
-        report: &mut Report,
-    ) -> u32 {
-        let Some(param) = self.find(name, &[ParamType::Integer]) else {
-            return default;
+    pub fn integer_in(&mut self, name: &'static str, default: u32, [least, most]: [u32; 2]) -> u32 {
+        let read = |param: &'a Param, report: &mut Report| {
+            let value = *one(param, param.values.integers(), report)?;
+            let limit = match u32::try_from(value) {
+                Ok(value) if (least..=most).contains(&value) => return Some(value),
+                Ok(value) if value > most => format!("at most {most}"),
+                _ => format!("at least {least}"),
+            };
+            report.fail(
+                param.value,
+                format!("{name:?} must be {limit}, found {value}"),
+            )
         };
-        let Some(Single::Integer(value)) = one(param, report) else {
-            return default;
-        };
-        match u32::try_from(value) {
-            Ok(value) if (least..=most).contains(&value) => value,
-            Ok(value) if value > most => {
-                let message = format!("{name:?} must be at most {most}, found {value}");
-                report.error(param.value, message);
-                default
-            }
-            _ => {
-                let message = format!("{name:?} must be at least {least}, found {value}");
-                report.error(param.value, message);
-                default
-            }
-        }
+        self.value(name, INTEGER, read).unwrap_or(default)
     }
 
     /// Single boolean, or the default.
-    pub fn bool(&mut self, name: &'static str, default: bool, report: &mut Report) -> bool {
-        match self.find(name, &[ParamType::Bool]) {
-            Some(param) => match one(param, report) {
-                Some(Single::Bool(value)) => value,
-                _ => default,
-            },
-            None => default,
-        }
+    pub fn bool(&mut self, name: &'static str, default: bool) -> bool {
+        let read = |param: &'a Param, report: &mut Report| one(param, param.values.bools(), report);
+        *self
+            .value(name, &[ParamType::Bool], read)
+            .unwrap_or(&default)
     }
 
     /// Single string with its place, if it is given.
-    pub fn string(&mut self, name: &'static str, report: &mut Report) -> Option<(&'a str, Span)> {
-        let param = self.find(name, &[ParamType::String])?;
-        one_string(param, report).map(|text| (text, param.value))
+    pub fn string(&mut self, name: &'static str) -> Option<(&'a str, Span)> {
+        let param = self.find(name, STRING)?;
+        one_string(param, self.report).map(|text| (text, param.value))
     }
 
     /// Single string with its place, which must be given.
-    pub fn needed_string(
-        &mut self,
-        name: &'static str,
-        report: &mut Report,
-    ) -> Option<(&'a str, Span)> {
-        let found = self.string(name, report);
+    pub fn needed_string(&mut self, name: &'static str) -> Option<(&'a str, Span)> {
+        let found = self.string(name);
         if found.is_none() {
-            self.report_missing(name, "string", report);
+            self.report_missing(name, "string");
         }
         found
     }
 
     /// Colour with finite components that are not negative, or the default.
-    pub fn color(&mut self, name: &'static str, default: Rgb, report: &mut Report) -> Rgb {
-        match self.find(name, COLOR) {
-            Some(param) => spectrum::read(param, report).unwrap_or(default),
-            None => default,
-        }
+    pub fn color(&mut self, name: &'static str, default: Rgb) -> Rgb {
+        self.value(name, COLOR, spectrum::read).unwrap_or(default)
     }
 
     /// Emitted colour, or the default. In pbrt-v4, spectra and black bodies have luminance 1.
-    pub fn emission(&mut self, name: &'static str, default: Rgb, report: &mut Report) -> Rgb {
-        match self.find(name, COLOR) {
-            Some(param) => spectrum::read_emission(param, report).unwrap_or(default),
-            None => default,
-        }
+    pub fn emission(&mut self, name: &'static str, default: Rgb) -> Rgb {
+        let found = self.value(name, COLOR, spectrum::read_emission);
+        found.unwrap_or(default)
     }
 
     /// Single finite point, or the default.
-    pub fn point(&mut self, name: &'static str, default: DVec3, report: &mut Report) -> DVec3 {
-        let Some(param) = self.find(name, &[ParamType::Point3]) else {
-            return default;
-        };
-        let Values::Points(values) = &param.values else {
-            return default;
-        };
-        one_triple(param, values, report).unwrap_or(default)
+    pub fn point(&mut self, name: &'static str, default: DVec3) -> DVec3 {
+        let found = self.value(name, &[ParamType::Point3], one_triple);
+        found.unwrap_or(default)
     }
 
     /// Single finite vector, or the default.
-    pub fn vector(&mut self, name: &'static str, default: DVec3, report: &mut Report) -> DVec3 {
-        let Some(param) = self.find(name, &[ParamType::Vector3]) else {
-            return default;
-        };
-        let Values::Floats(values) = &param.values else {
-            return default;
-        };
-        let values: Vec<f64> = values.iter().copied().map(f64::from).collect();
-        one_triple(param, &values, report).unwrap_or(default)
+    pub fn vector(&mut self, name: &'static str, default: DVec3) -> DVec3 {
+        let found = self.value(name, &[ParamType::Vector3], one_triple);
+        found.unwrap_or(default)
     }
 
     /// Choice of one of several words. The first is the default.
@@ -340,120 +330,86 @@ impl<'a> Lookup<'a> {
         &mut self,
         name: &'static str,
         choices: [(&str, T); N],
-        report: &mut Report,
     ) -> T {
-        if let Some((word, span)) = self.string(name, report) {
+        if let Some((word, span)) = self.string(name) {
             if let Some((_, choice)) = choices.iter().find(|(known, _)| *known == word) {
                 return *choice;
             }
-            report.error_help(
-                span,
-                format!("{name:?} cannot be {word:?}"),
-                suggest::help(word, &choices.map(|(known, _)| known)),
-            );
+            let help = suggest::help(word, &choices.map(|(known, _)| known));
+            (self.report).error_help(span, format!("{name:?} cannot be {word:?}"), help);
         }
         choices[0].1
     }
 
     /// Accepts a parameter that cannot change the picture, with a note.
-    pub fn left_out(
-        &mut self,
-        name: &'static str,
-        types: &'static [ParamType],
-        why: &str,
-        report: &mut Report,
-    ) {
+    pub fn left_out(&mut self, name: &'static str, types: &'static [ParamType], why: &str) {
         if let Some(param) = self.find(name, types) {
-            report.note(
-                param.declaration,
-                format!("{name:?} of {} is left out: {why}", self.what),
-            );
+            let message = format!("{name:?} of {} is left out: {why}", self.what());
+            self.report.note(param.declaration, message);
         }
     }
 
     /// Refuses a parameter of pbrt-v3 that is not supported.
-    pub fn unsupported(
-        &mut self,
-        name: &'static str,
-        types: &'static [ParamType],
-        report: &mut Report,
-    ) {
+    pub fn refuse_param(&mut self, name: &'static str, types: &'static [ParamType]) {
         if let Some(param) = self.find(name, types) {
-            report.unsupported(
-                param.declaration,
-                format!("parameter {name:?} of {} is", self.what),
-            );
+            let feature = format!("parameter {name:?} of {} is", self.what());
+            self.report.unsupported(param.declaration, feature);
         }
     }
 }
 
-enum Single<'a> {
-    Float(f32),
-    Integer(i32),
-    Bool(bool),
-    String(&'a str),
+/// Reads what a directive declares, and reports the parameters that `by` does not use. `noun` says what that is.
+pub(crate) fn read<T>(
+    noun: &'static str,
+    at: Span,
+    (kind, params): (&Quoted, &Params),
+    report: &mut Report,
+    by: impl FnOnce(&mut Lookup) -> T,
+) -> T {
+    let mut lookup = Lookup::new(noun, at, kind, params, report);
+    let value = by(&mut lookup);
+    lookup.finish();
+    value
 }
 
 /// Only value of a parameter. `None`: there are none or several, which was reported.
-fn one<'a>(param: &'a Param, report: &mut Report) -> Option<Single<'a>> {
-    match &param.values {
-        Values::Broken => return None,
-        Values::Floats(v) if v.len() == 1 => return Some(Single::Float(v[0])),
-        Values::Integers(v) if v.len() == 1 => return Some(Single::Integer(v[0])),
-        Values::Bools(v) if v.len() == 1 => return Some(Single::Bool(v[0])),
-        Values::Strings(v) if v.len() == 1 => return Some(Single::String(&v[0])),
-        _ => {}
+fn one<'a, T>(param: &Param, values: Option<&'a [T]>, report: &mut Report) -> Option<&'a T> {
+    match values? {
+        [value] => Some(value),
+        values => {
+            let (name, found) = (&param.name, values.len());
+            report.fail(
+                param.list,
+                format!("{name:?} takes one value, found {found}"),
+            )
+        }
     }
-    report.error(
-        param.list,
-        format!(
-            "{:?} takes one value, found {}",
-            param.name,
-            param.values.len()
-        ),
-    );
-    None
 }
 
 /// Only value of a float parameter, if it is finite.
 pub(crate) fn one_float(param: &Param, report: &mut Report) -> Option<f32> {
-    match one(param, report)? {
-        Single::Float(value) if value.is_finite() => Some(value),
-        Single::Float(value) => {
-            report.error(
-                param.value,
-                format!("{:?} must be finite, found {value}", param.name),
-            );
-            None
-        }
-        _ => None,
+    let value = *one(param, param.values.floats(), report)?;
+    if value.is_finite() {
+        return Some(value);
     }
+    let message = format!("{:?} must be finite, found {value}", param.name);
+    report.fail(param.value, message)
 }
 
 /// One finite point or vector. `None`: a mistake was reported.
-fn one_triple(param: &Param, values: &[f64], report: &mut Report) -> Option<DVec3> {
-    let name = &param.name;
-    match *values {
-        [x, y, z] if DVec3::new(x, y, z).is_finite() => Some(DVec3::new(x, y, z)),
-        [_, _, _] => {
-            report.error(param.list, format!("{name:?} must be finite"));
-            None
-        }
-        _ => {
-            let what = param.param_type.name();
-            let found = values.len() / 3;
-            report.error(param.list, format!("{name:?} is one {what}, found {found}"));
-            None
-        }
-    }
+fn one_triple(param: &Param, report: &mut Report) -> Option<DVec3> {
+    let (name, what) = (&param.name, param.param_type.name());
+    let message = match param.values.doubles()?[..] {
+        [x, y, z] if DVec3::new(x, y, z).is_finite() => return Some(DVec3::new(x, y, z)),
+        [_, _, _] => format!("{name:?} must be finite"),
+        ref values => format!("{name:?} is one {what}, found {}", values.len() / 3),
+    };
+    report.fail(param.list, message)
 }
 
 /// Only value of a string or texture parameter.
 pub(crate) fn one_string<'a>(param: &'a Param, report: &mut Report) -> Option<&'a str> {
-    match one(param, report)? {
-        Single::String(text) => Some(text),
-        _ => None,
-    }
+    one(param, param.values.strings(), report).map(String::as_str)
 }
 
 fn range_text(low: f32, high: f32) -> String {

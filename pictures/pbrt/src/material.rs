@@ -70,9 +70,12 @@ pub(crate) fn declare(
     state: &State,
     report: &mut Report,
 ) -> MaterialSpec {
-    let mut lookup = Lookup::new(at, format!("material {:?}", kind.text), &params);
-    let material = build(&kind, &mut lookup, state, report);
-    lookup.finish(report);
+    let mut values = Textured {
+        lookup: Lookup::new("material", at, &kind, &params, report),
+        state,
+    };
+    let material = build(&kind, &mut values);
+    values.lookup.finish();
     MaterialSpec {
         kind,
         params,
@@ -88,29 +91,27 @@ pub(crate) fn declare_named(
     state: &State,
     report: &mut Report,
 ) -> MaterialSpec {
-    let mut lookup = Lookup::new(at, format!("named material {:?}", name.text), &params);
-    let kind = match lookup.string("type", report) {
+    let mut values = Textured {
+        lookup: Lookup::new("named material", at, name, &params, report),
+        state,
+    };
+    let kind = match values.string("type") {
         Some((text, span)) => Quoted {
             text: text.to_owned(),
             span,
         },
         None => {
-            if !lookup.has("type") {
-                report.error_help(
-                    name.span,
-                    format!("named material {:?} has no type", name.text),
-                    "add \"string type\" \"matte\" or another material",
-                );
+            if !values.has("type") {
+                let message = format!("{} has no type", values.what());
+                let help = "add \"string type\" \"matte\" or another material";
+                values.report.error_help(name.span, message, help);
             }
-            lookup.ignore_all();
-            Quoted {
-                text: "matte".into(),
-                span: name.span,
-            }
+            values.ignore_all();
+            matte(name.span)
         }
     };
-    let material = build(&kind, &mut lookup, state, report);
-    lookup.finish(report);
+    let material = build(&kind, &mut values);
+    values.lookup.finish();
     MaterialSpec {
         kind,
         params,
@@ -118,87 +119,75 @@ pub(crate) fn declare_named(
     }
 }
 
+/// Kind of the default material, where a file names none.
+fn matte(span: Span) -> Quoted {
+    Quoted {
+        text: "matte".into(),
+        span,
+    }
+}
+
 /// Material of a shape: the current one, with overrides from the shape's own parameters.
 pub(crate) fn of_shape<'a>(
     current: Option<&'a MaterialSpec>,
-    lookup: &mut Lookup<'a>,
-    state: &State,
-    report: &mut Report,
+    values: &mut Textured<'a>,
 ) -> Material {
-    let overrides = (PARAMETERS.iter().chain(&*NAMES)).any(|name| lookup.has(name));
+    let overrides = (PARAMETERS.iter().chain(&*NAMES)).any(|name| values.has(name));
     match current {
         Some(spec) if !overrides => spec.material.clone(),
         None if !overrides => DEFAULT,
         Some(spec) => {
-            lookup.fall_back_on(&spec.params);
-            build(&spec.kind, lookup, state, report)
+            values.fall_back_on(&spec.params);
+            build(&spec.kind, values)
         }
-        None => {
-            let kind = Quoted {
-                text: "matte".into(),
-                span: lookup.at,
-            };
-            build(&kind, lookup, state, report)
-        }
+        None => build(&matte(values.at), values),
     }
 }
 
 /// Reads the parameters of a material. Mistakes are reported and replaced by defaults.
-fn build(kind: &Quoted, lookup: &mut Lookup, state: &State, report: &mut Report) -> Material {
-    let mut values = Textured {
-        lookup,
-        state,
-        report,
-    };
+fn build(kind: &Quoted, values: &mut Textured) -> Material {
     let material = match kind.text.as_str() {
         "" | "none" => return Material::None,
-        "disney" => disney::disney(&mut values),
-        "hair" => hair::hair(&mut values),
-        "subsurface" => subsurface::coefficients(&mut values),
-        "kdsubsurface" => subsurface::diffuse(&mut values),
-        "fourier" => match fourier(&mut values) {
-            Some(material) => material,
-            None => DEFAULT,
-        },
-        "mix" => return mix(&mut values),
-        other => match Material::read(other, &mut values) {
-            Some(material) => material,
-            None => match version4::build(other, &mut values) {
-                Some(material) => material,
-                None => unknown(other, kind.span, &mut values),
-            },
-        },
+        "disney" => disney::disney(values),
+        "hair" => hair::hair(values),
+        "subsurface" => subsurface::coefficients(values),
+        "kdsubsurface" => subsurface::diffuse(values),
+        "fourier" => fourier(values).unwrap_or(DEFAULT),
+        "mix" => return mix(values),
+        other => Material::read(other, values)
+            .or_else(|| version4::build(other, values))
+            .unwrap_or_else(|| unknown(other, kind.span, values)),
     };
-    if let Some((height @ Param::Texture(_), _)) = values.find("bumpmap") {
+    if let Some((height @ Param::Texture(_), _)) = values.textured("bumpmap") {
         return Material::Bumped(Bumped {
             material: Arc::new(material),
             height,
         });
     }
     // A constant height does not tilt normals.
-    match values.report.is_version4.then(|| values.find("normalmap")) {
-        Some(Some((normal, _))) => Material::NormalMapped(NormalMapped {
+    if values.is_version4()
+        && let Some((normal, _)) = values.textured("normalmap")
+    {
+        return Material::NormalMapped(NormalMapped {
             material: Arc::new(material),
             normal,
             scale: 1.0,
-        }),
-        _ => material,
+        });
     }
+    material
 }
 
 /// Matte in the place of an unknown material, as in pbrt-v3.
 fn unknown(other: &str, at: Span, values: &mut Textured) -> Material {
     let mistake = format!("unknown material {other:?}");
     let mut known = supported();
-    if values.report.is_version4 {
+    if values.is_version4() {
         known.extend(version4::SUPPORTED);
     }
     let help = || suggest::help(other, &known);
-    values
-        .report
-        .tolerated(at, mistake, "\"matte\" is taken", help);
+    (values.report).tolerated(at, mistake, "\"matte\" is taken", help);
     let matte = Matte::read(values).into();
-    values.lookup.ignore_all();
+    values.ignore_all();
     matte
 }
 
@@ -211,28 +200,23 @@ fn named_color(name: &str) -> Rgb {
 }
 
 /// Reads the table that a `fourier` names. `None`: a mistake was reported.
-fn fourier(values: &mut Textured) -> Option<Material> {
-    let Textured { lookup, report, .. } = values;
-    let Some((name, span)) = lookup.string("bsdffile", report) else {
-        lookup.report_missing("bsdffile", "string", report);
-        return None;
-    };
+fn fourier(lookup: &mut Lookup) -> Option<Material> {
+    let (name, span) = lookup.needed_string("bsdffile")?;
     let Report {
         tables, sources, ..
-    } = &mut **report;
+    } = &mut *lookup.report;
     match tables.read(name, sources) {
         Ok(table) => Some(Fourier { table }.into()),
         Err(problem) => {
             let message = format!("cannot read table {name:?}: {problem}");
             let help = "paths start at the folder of the main scene file";
-            report.error_help(span, message, help);
-            None
+            lookup.report.fail_help(span, message, help)
         }
     }
 }
 
-fn remap_roughness(values: &mut Textured) -> bool {
-    values.lookup.bool("remaproughness", true, values.report)
+fn remap_roughness(lookup: &mut Lookup) -> bool {
+    lookup.bool("remaproughness", true)
 }
 
 fn optional_roughness(values: &mut Textured, name: &'static str) -> Option<Param<f32>> {
@@ -263,7 +247,8 @@ fn mix(values: &mut Textured) -> Material {
     if !parts::material_fits(&mixture) {
         let most = parts::MAX_PARTS;
         let message = format!("a mixture is made of more than {most} materials");
-        values.report.error_once(values.lookup.at, message, None);
+        let at = values.at;
+        values.report.error_once(at, message, None);
         return DEFAULT;
     }
     match height {
@@ -277,7 +262,7 @@ fn mix(values: &mut Textured) -> Material {
 
 /// Scale of the first material: a colour, or a number in pbrt-v4.
 fn amount(values: &mut Textured) -> Param<Rgb> {
-    if !values.report.is_version4 {
+    if !values.is_version4() {
         return values.param("amount", 0.5);
     }
     match values.param::<f32>("amount", 0.5) {
@@ -298,39 +283,36 @@ fn unbumped(material: Material) -> (Arc<Material>, Option<Param<f32>>) {
 }
 
 fn mixed_material(values: &mut Textured, param: &'static str) -> Option<Material> {
-    let Some((name, span)) = values.lookup.string(param, values.report) else {
-        let at = values.lookup.at;
-        let message = format!("{} needs a parameter {param:?}", values.lookup.what());
+    let Some((name, span)) = values.string(param) else {
+        let message = format!("{} needs a parameter {param:?}", values.what());
         let help = format!("add \"string {param}\" with the name of a material");
-        values.report.error_help(at, message, help);
-        return None;
+        return values.fail_help(message, &help);
     };
     let named = &values.state.named_materials;
     match named.get(name).map(|spec| &spec.material) {
-        Some(Material::Subsurface(_)) => {
-            let feature = "a mixture with subsurface scattering is";
-            values.report.unsupported(span, feature);
-            None
-        }
-        Some(Material::Bumped(Bumped { material, .. }))
-            if matches!(**material, Material::Subsurface(_)) =>
-        {
-            let feature = "a mixture with subsurface scattering is";
-            values.report.unsupported(span, feature);
+        Some(material) if is_subsurface(material) => {
+            (values.report).unsupported(span, "a mixture with subsurface scattering is");
             None
         }
         Some(Material::None) => {
             let message = "a mixture with material \"none\" is no surface; pbrt-v3 fails here";
-            values.report.error(span, message);
-            None
+            values.report.fail(span, message)
         }
         Some(material) => Some(material.clone()),
         None => {
             let mistake = format!("no material is named {name:?} here");
             let help = || suggest::help(name, &named.names());
-            let report = &mut values.report;
-            report.tolerated(span, mistake, "\"matte\" is taken", help);
+            (values.report).tolerated(span, mistake, "\"matte\" is taken", help);
             Some(DEFAULT)
         }
+    }
+}
+
+/// Whether a material scatters light below its surface, with or without a bump map.
+fn is_subsurface(material: &Material) -> bool {
+    match material {
+        Material::Subsurface(_) => true,
+        Material::Bumped(Bumped { material, .. }) => matches!(**material, Material::Subsurface(_)),
+        _ => false,
     }
 }

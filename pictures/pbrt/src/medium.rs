@@ -3,12 +3,8 @@
 use antumbra_scene::{DensityGrid, Medium, Rgb};
 use glam::{DMat4, DVec3};
 
-use crate::directive::Quoted;
-use crate::lookup::Lookup;
-use crate::params::{ParamType, Params, Values};
+use crate::lookup::{FLOAT, Lookup, NOT_NEGATIVE};
 use crate::presets::{self, Coefficients};
-use crate::report::Report;
-use crate::source::Span;
 use crate::{suggest, transform};
 
 /// Supported media.
@@ -17,40 +13,30 @@ pub(crate) const SUPPORTED: &[&str] = &["heterogeneous", "homogeneous"];
 /// Largest number of cells of a grid along an axis.
 const MAX_CELLS: u32 = 1 << 16;
 
-/// Handles `MakeNamedMedium "name" "string type" "kind"`. `None`: a mistake was reported.
-pub(crate) fn declare(
-    at: Span,
-    name: &Quoted,
-    params: &Params,
-    world_from_medium: &DMat4,
-    report: &mut Report,
-) -> Option<Medium> {
-    let mut lookup = Lookup::new(at, format!("medium {:?}", name.text), params);
-    let medium = read(&mut lookup, world_from_medium, report);
+/// Reads a `MakeNamedMedium "name" "string type" "kind"`. `None`: a mistake was reported.
+pub(crate) fn read(lookup: &mut Lookup, world_from_medium: &DMat4) -> Option<Medium> {
+    let medium = of_type(lookup, world_from_medium);
     if medium.is_none() {
         lookup.ignore_all();
     }
-    lookup.finish(report);
     medium
 }
 
-fn read(lookup: &mut Lookup, world_from_medium: &DMat4, report: &mut Report) -> Option<Medium> {
-    let (kind, kind_span) = lookup.needed_string("type", report)?;
+fn of_type(lookup: &mut Lookup, world_from_medium: &DMat4) -> Option<Medium> {
+    let (kind, kind_span) = lookup.needed_string("type")?;
     let Coefficients {
         absorption,
         scattering,
-    } = coefficients(lookup, "sigma_s", report);
-    let asymmetry = lookup.float("g", 0.0, report);
+    } = coefficients(lookup, "sigma_s");
+    let asymmetry = lookup.float("g", 0.0);
     if !(asymmetry > -1.0 && asymmetry < 1.0) {
-        let message = format!("\"g\" must be between -1 and 1, found {asymmetry}");
-        report.error(lookup.at, message);
-        return None;
+        return lookup.fail(format!("\"g\" must be between -1 and 1, found {asymmetry}"));
     }
     let density = match kind {
         "homogeneous" => None,
-        "heterogeneous" => Some(grid(lookup, world_from_medium, report)?),
+        "heterogeneous" => Some(grid(lookup, world_from_medium)?),
         kind => {
-            report.unknown(kind_span, "medium", kind, SUPPORTED);
+            lookup.report.unknown(kind_span, "medium", kind, SUPPORTED);
             return None;
         }
     };
@@ -63,18 +49,14 @@ fn read(lookup: &mut Lookup, world_from_medium: &DMat4, report: &mut Report) -> 
 }
 
 /// Absorption "sigma_a" and scattering of the given name, by "preset" where they are not given, times "scale".
-pub(crate) fn coefficients(
-    lookup: &mut Lookup,
-    scattering: &'static str,
-    report: &mut Report,
-) -> Coefficients {
+pub(crate) fn coefficients(lookup: &mut Lookup, scattering: &'static str) -> Coefficients {
     let mut found = presets::DEFAULT;
-    if let Some((name, span)) = lookup.string("preset", report)
+    if let Some((name, span)) = lookup.string("preset")
         && !name.is_empty()
     {
         match presets::by_name(name) {
             Some(preset) => found = preset,
-            None => report.tolerated(
+            None => lookup.report.tolerated(
                 span,
                 format!("no preset is named {name:?}"),
                 "the coefficients of whole milk are taken",
@@ -82,8 +64,8 @@ pub(crate) fn coefficients(
             ),
         }
     }
-    let scale = lookup.float_in("scale", 1.0, [0.0, f32::MAX], report);
-    let mut color = |name, default: Rgb| lookup.color(name, default, report) * scale;
+    let scale = lookup.float_in("scale", 1.0, NOT_NEGATIVE);
+    let mut color = |name, default: Rgb| lookup.color(name, default) * scale;
     Coefficients {
         absorption: color("sigma_a", found.absorption),
         scattering: color(scattering, found.scattering),
@@ -91,18 +73,12 @@ pub(crate) fn coefficients(
 }
 
 /// Density on a grid in the box from "p0" to "p1". `None`: a mistake was reported.
-fn grid(
-    lookup: &mut Lookup,
-    world_from_medium: &DMat4,
-    report: &mut Report,
-) -> Option<DensityGrid> {
-    let size = ["nx", "ny", "nz"].map(|name| lookup.integer_in(name, 1, [1, MAX_CELLS], report));
-    let p0 = lookup.point("p0", DVec3::ZERO, report);
-    let p1 = lookup.point("p1", DVec3::ONE, report);
-    let param = lookup.needed("density", &[ParamType::Float], "float", report)?;
-    let Values::Floats(values) = &param.values else {
-        return None;
-    };
+fn grid(lookup: &mut Lookup, world_from_medium: &DMat4) -> Option<DensityGrid> {
+    let size = ["nx", "ny", "nz"].map(|name| lookup.integer_in(name, 1, [1, MAX_CELLS]));
+    let p0 = lookup.point("p0", DVec3::ZERO);
+    let p1 = lookup.point("p1", DVec3::ONE);
+    let param = lookup.needed("density", FLOAT)?;
+    let values = param.values.floats()?;
     let cells: u64 = size.iter().map(|&count| u64::from(count)).product();
     if values.len() as u64 != cells {
         let [x, y, z] = size;
@@ -110,34 +86,26 @@ fn grid(
             "{} values of \"density\" for {x} x {y} x {z} cells, which are {cells}",
             values.len()
         );
-        report.error(param.list, message);
-        return None;
+        return lookup.report.fail(param.list, message);
     }
-    if let Some(index) = values
-        .iter()
-        .position(|&value| !(value >= 0.0 && value.is_finite()))
-    {
-        let place = param.value_span(index, report);
-        let message = format!(
-            "a density must be finite and not negative, found {}",
-            values[index]
-        );
-        report.error(place, message);
-        return None;
+    let is_wrong = |value: &f32| !(*value >= 0.0 && value.is_finite());
+    if let Some(index) = values.iter().position(is_wrong) {
+        let place = param.value_span(index, lookup.report);
+        let found = values[index];
+        let message = format!("a density must be finite and not negative, found {found}");
+        return lookup.report.fail(place, message);
     }
     let box_from_grid = DMat4::from_translation(p0) * DMat4::from_scale(p1 - p0);
     let world_from_grid = (*world_from_medium * box_from_grid).as_mat4();
     if !transform::is_invertible(&world_from_grid.as_dmat4()) {
-        report.error_help(
-            lookup.at,
+        return lookup.fail_help(
             "the box of the medium is empty, or the current transformation cannot be inverted",
             "\"p0\" and \"p1\" must differ in every coordinate",
         );
-        return None;
     }
     Some(DensityGrid {
         size,
-        values: values.as_slice().into(),
+        values: values.into(),
         world_from_grid,
     })
 }

@@ -149,8 +149,5 @@ fn report_error(file: &MeshFile, error: &Error, report: &mut Report) {
         error => (error.to_string(), None),
     };
     let message = format!("cannot read mesh {:?}: {problem}", file.name);
-    match help {
-        Some(help) => report.error_help(file.at, message, help),
-        None => report.error(file.at, message),
-    }
+    report.add_error(file.at, message, help);
 }

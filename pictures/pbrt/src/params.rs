@@ -3,6 +3,8 @@
 //! Values are read by the declared type, so a wrong value is reported at its own place. [`crate::lookup`] then looks
 //! up the parameters that a directive knows.
 
+use glam::DVec3;
+
 use crate::lexer::{Lexer, Token, TokenKind, unquote};
 use crate::number::{NumberError, parse_float, parse_integer};
 use crate::report::Report;
@@ -82,6 +84,55 @@ pub(crate) enum Values {
 }
 
 impl Values {
+    /// The values, if they are integers.
+    pub fn integers(&self) -> Option<&[i32]> {
+        match self {
+            Self::Integers(values) => Some(values),
+            _ => None,
+        }
+    }
+
+    /// The values, if they are numbers but no coordinates of points.
+    pub fn floats(&self) -> Option<&[f32]> {
+        match self {
+            Self::Floats(values) => Some(values),
+            _ => None,
+        }
+    }
+
+    /// The values, if they are numbers, in double precision.
+    pub fn doubles(&self) -> Option<Vec<f64>> {
+        match self {
+            Self::Points(values) => Some(values.clone()),
+            Self::Floats(values) => Some(values.iter().copied().map(f64::from).collect()),
+            _ => None,
+        }
+    }
+
+    /// The values, if they are strings.
+    pub fn strings(&self) -> Option<&[String]> {
+        match self {
+            Self::Strings(values) => Some(values),
+            _ => None,
+        }
+    }
+
+    /// The values, if they are true or false.
+    pub fn bools(&self) -> Option<&[bool]> {
+        match self {
+            Self::Bools(values) => Some(values),
+            _ => None,
+        }
+    }
+
+    /// The points, if the values are points.
+    pub fn points(&self) -> Option<impl ExactSizeIterator<Item = DVec3>> {
+        match self {
+            Self::Points(values) => Some(values.chunks_exact(3).map(DVec3::from_slice)),
+            _ => None,
+        }
+    }
+
     /// Number of values.
     pub fn len(&self) -> usize {
         match self {

@@ -72,6 +72,28 @@ impl Report {
         self.add(Severity::Error, span, message.into(), Some(help.into()));
     }
 
+    /// Records a mistake in place of a value.
+    pub fn fail<T>(&mut self, span: Span, message: impl Into<String>) -> Option<T> {
+        self.error(span, message);
+        None
+    }
+
+    /// Records a mistake and what would be right, in place of a value.
+    pub fn fail_help<T>(
+        &mut self,
+        span: Span,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Option<T> {
+        self.error_help(span, message, help);
+        None
+    }
+
+    /// Records a mistake and perhaps what would be right.
+    pub fn add_error(&mut self, span: Span, message: String, help: Option<String>) {
+        self.add(Severity::Error, span, message, help);
+    }
+
     /// Records that a name is not known, with the known one that is closest.
     pub fn unknown(&mut self, span: Span, what: &str, name: &str, known: &[&str]) {
         let message = format!("unknown {what} {name:?}");
@@ -136,6 +158,12 @@ impl Report {
         self.unsupported_help(span, format!("{} not supported yet", feature.into()), None);
     }
 
+    /// Records the use of an unsupported feature in place of a value.
+    pub fn refuse<T>(&mut self, span: Span, feature: impl Into<String>) -> Option<T> {
+        self.unsupported(span, feature);
+        None
+    }
+
     fn unsupported_help(&mut self, span: Span, message: String, help: Option<&str>) {
         if self.skips_unsupported {
             let help = help.map(String::from);
@@ -170,6 +198,11 @@ impl Report {
     /// Number of mistakes so far, including those that were not kept.
     pub fn error_count(&self) -> usize {
         self.errors.list.len() + self.errors.omitted
+    }
+
+    /// `None` if there was a mistake after the first `earlier` ones.
+    pub fn clean_since(&self, earlier: usize) -> Option<()> {
+        (self.error_count() == earlier).then_some(())
     }
 
     /// Counts a mistake and returns true if it would not be kept. Returns false if it should be recorded.

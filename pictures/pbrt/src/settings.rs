@@ -6,11 +6,8 @@ use antumbra_scene::{
     Accelerator, DirectStrategy, Integrator, LightStrategy, Sampler, SamplerKind,
 };
 
-use crate::directive::Quoted;
-use crate::lookup::Lookup;
-use crate::params::{ParamType, Params};
-use crate::report::Report;
-use crate::source::Span;
+use crate::lookup::{FLOAT, INTEGER, Lookup, STRING};
+use crate::params::ParamType;
 
 /// Default sampler of pbrt.
 pub(crate) const DEFAULT_SAMPLER: Sampler = Sampler {
@@ -29,27 +26,21 @@ pub(crate) const SAMPLERS: &[&str] = &[
     "stratified",
 ];
 
-/// Handles `Sampler`.
-pub(crate) fn declare_sampler(
-    at: Span,
-    kind: &Quoted,
-    params: &Params,
-    report: &mut Report,
-) -> Sampler {
-    let mut lookup = Lookup::new(at, format!("sampler {:?}", kind.text), params);
-    let sampler_kind = match kind.text.as_str() {
+/// Reads a `Sampler`.
+pub(crate) fn sampler(lookup: &mut Lookup) -> Sampler {
+    let sampler_kind = match lookup.kind.text.as_str() {
         "random" => SamplerKind::Random,
         "stratified" => SamplerKind::Stratified {
-            x: lookup.integer_from("xsamples", 4, 1, report),
-            y: lookup.integer_from("ysamples", 4, 1, report),
-            jitter: lookup.bool("jitter", true, report),
+            x: lookup.integer_from("xsamples", 4, 1),
+            y: lookup.integer_from("ysamples", 4, 1),
+            jitter: lookup.bool("jitter", true),
         },
         "halton" => SamplerKind::Halton,
         "sobol" => SamplerKind::Sobol,
         "02sequence" | "lowdiscrepancy" => SamplerKind::ZeroTwoSequence,
         "maxmindist" => SamplerKind::MaxMinDist,
-        name => {
-            report.unknown(kind.span, "sampler", name, SAMPLERS);
+        _ => {
+            lookup.unknown(SAMPLERS);
             return DEFAULT_SAMPLER;
         }
     };
@@ -58,26 +49,26 @@ pub(crate) fn declare_sampler(
         SamplerKind::Stratified { x, y, .. } => {
             let product = x.checked_mul(y).filter(|&product| product <= MAX);
             product.unwrap_or_else(|| {
-                let message = format!("{x} times {y} samples per pixel are more than {MAX}");
-                report.error(lookup.at, message);
+                lookup.error(format!(
+                    "{x} times {y} samples per pixel are more than {MAX}"
+                ));
                 1
             })
         }
-        SamplerKind::Random => lookup.integer_in("pixelsamples", 4, [1, MAX], report),
-        _ => lookup.integer_in("pixelsamples", 16, [1, MAX], report),
+        SamplerKind::Random => lookup.integer_in("pixelsamples", 4, [1, MAX]),
+        _ => lookup.integer_in("pixelsamples", 16, [1, MAX]),
     };
     use SamplerKind as S;
-    if sampler_kind == S::Halton && lookup.bool("samplepixelcenter", false, report) {
-        report.unsupported(lookup.at, "sampling pixel centres only is");
+    if sampler_kind == S::Halton && lookup.bool("samplepixelcenter", false) {
+        lookup.unsupported("sampling pixel centres only is");
     }
     if matches!(
         sampler_kind,
         S::Stratified { .. } | S::ZeroTwoSequence | S::MaxMinDist
     ) {
         let why = "it changes noise, not the picture";
-        lookup.left_out("dimensions", &[ParamType::Integer], why, report);
+        lookup.left_out("dimensions", INTEGER, why);
     }
-    lookup.finish(report);
     Sampler {
         kind: sampler_kind,
         pixel_samples,
@@ -99,30 +90,24 @@ pub(crate) const INTEGRATORS: &[&str] = &[
 
 /// Parameters of integrators that are taken as `path` or `volpath`, which change only noise and time.
 const OF_OTHER_INTEGRATORS: &[(&str, &[ParamType])] = &[
-    ("bootstrapsamples", &[ParamType::Integer]),
-    ("chains", &[ParamType::Integer]),
-    ("imagewritefrequency", &[ParamType::Integer]),
-    ("iterations", &[ParamType::Integer]),
-    ("largestepprobability", &[ParamType::Float]),
-    ("mutationsperpixel", &[ParamType::Integer]),
-    ("numiterations", &[ParamType::Integer]),
-    ("photonsperiteration", &[ParamType::Integer]),
-    ("radius", &[ParamType::Float]),
-    ("sigma", &[ParamType::Float]),
+    ("bootstrapsamples", INTEGER),
+    ("chains", INTEGER),
+    ("imagewritefrequency", INTEGER),
+    ("iterations", INTEGER),
+    ("largestepprobability", FLOAT),
+    ("mutationsperpixel", INTEGER),
+    ("numiterations", INTEGER),
+    ("photonsperiteration", INTEGER),
+    ("radius", FLOAT),
+    ("sigma", FLOAT),
     ("visualizestrategies", &[ParamType::Bool]),
     ("visualizeweights", &[ParamType::Bool]),
 ];
 
-/// Handles `Integrator`.
-pub(crate) fn declare_integrator(
-    at: Span,
-    kind: &Quoted,
-    params: &Params,
-    report: &mut Report,
-) -> Integrator {
-    let mut lookup = Lookup::new(at, format!("integrator {:?}", kind.text), params);
-    lookup.unsupported("pixelbounds", &[ParamType::Integer], report);
-    let taken_as = match kind.text.as_str() {
+/// Reads an `Integrator`.
+pub(crate) fn integrator(lookup: &mut Lookup) -> Integrator {
+    lookup.refuse_param("pixelbounds", INTEGER);
+    let taken_as = match lookup.kind.text.as_str() {
         "bdpt" | "mlt" => Some("volpath"),
         "sppm" => Some("path"),
         _ => None,
@@ -132,79 +117,67 @@ pub(crate) fn declare_integrator(
             let _ = lookup.find(name, types);
         }
         let message = format!(
-            "integrator {:?} is taken as {taken_as:?}: caustics of point, spot and distant lights are missing",
-            kind.text
+            "{} is taken as {taken_as:?}: caustics of point, spot and distant lights are missing",
+            lookup.what()
         );
-        report.note(kind.span, message);
+        lookup.report.note(lookup.kind.span, message);
     }
-    let integrator = match kind.text.as_str() {
+    match lookup.kind.text.as_str() {
         "path" | "sppm" => Integrator::Path {
-            max_depth: lookup.integer_from("maxdepth", 5, 0, report),
-            rr_threshold: lookup.float("rrthreshold", 1.0, report),
-            light_strategy: light_strategy(&mut lookup, report),
+            max_depth: lookup.integer_from("maxdepth", 5, 0),
+            rr_threshold: lookup.float("rrthreshold", 1.0),
+            light_strategy: light_strategy(lookup),
         },
         "bdpt" | "mlt" | "volpath" => Integrator::VolumePath {
-            max_depth: lookup.integer_from("maxdepth", 5, 0, report),
-            rr_threshold: lookup.float("rrthreshold", 1.0, report),
-            light_strategy: light_strategy(&mut lookup, report),
+            max_depth: lookup.integer_from("maxdepth", 5, 0),
+            rr_threshold: lookup.float("rrthreshold", 1.0),
+            light_strategy: light_strategy(lookup),
         },
         "whitted" => {
-            report.note(
-                kind.span,
-                "integrator \"whitted\" is taken as \"directlighting\"",
-            );
+            let message = "integrator \"whitted\" is taken as \"directlighting\"";
+            lookup.report.note(lookup.kind.span, message);
             Integrator::DirectLighting {
                 strategy: DirectStrategy::All,
-                max_depth: lookup.integer_from("maxdepth", 5, 0, report),
+                max_depth: lookup.integer_from("maxdepth", 5, 0),
             }
         }
         "directlighting" => Integrator::DirectLighting {
-            strategy: direct_strategy(&mut lookup, report),
-            max_depth: lookup.integer_from("maxdepth", 5, 0, report),
+            strategy: direct_strategy(lookup),
+            max_depth: lookup.integer_from("maxdepth", 5, 0),
         },
         "ambientocclusion" | "ao" => Integrator::AmbientOcclusion {
-            samples: lookup.integer_in("nsamples", 64, [1, Sampler::MAX_SAMPLES], report),
-            cosine_sampling: lookup.bool("cossample", true, report),
+            samples: lookup.integer_in("nsamples", 64, [1, Sampler::MAX_SAMPLES]),
+            cosine_sampling: lookup.bool("cossample", true),
             distance: f32::INFINITY,
             open: std::f32::consts::PI,
         },
-        name => {
-            report.unknown(kind.span, "integrator", name, INTEGRATORS);
-            lookup.ignore_all();
+        _ => {
+            lookup.unknown(INTEGRATORS);
             Integrator::default()
         }
-    };
-    lookup.finish(report);
-    integrator
+    }
 }
 
-fn light_strategy(lookup: &mut Lookup, report: &mut Report) -> LightStrategy {
-    match lookup.string("lightsamplestrategy", report) {
+fn light_strategy(lookup: &mut Lookup) -> LightStrategy {
+    match lookup.string("lightsamplestrategy") {
         None | Some(("spatial", _)) => LightStrategy::Spatial,
         Some(("power", _)) => LightStrategy::Power,
         Some(("uniform", _)) => LightStrategy::Uniform,
         Some((unknown, span)) => {
-            report.unknown(
-                span,
-                "light sample strategy",
-                unknown,
-                &["power", "spatial", "uniform"],
-            );
+            let known = ["power", "spatial", "uniform"];
+            (lookup.report).unknown(span, "light sample strategy", unknown, &known);
             LightStrategy::Spatial
         }
     }
 }
 
-fn direct_strategy(lookup: &mut Lookup, report: &mut Report) -> DirectStrategy {
-    match lookup.string("strategy", report) {
+fn direct_strategy(lookup: &mut Lookup) -> DirectStrategy {
+    match lookup.string("strategy") {
         None | Some(("all", _)) => DirectStrategy::All,
         Some(("one", _)) => DirectStrategy::One,
         Some((unknown, span)) => {
-            report.error_help(
-                span,
-                format!("unknown strategy {unknown:?}"),
-                "known: all, one",
-            );
+            let message = format!("unknown strategy {unknown:?}");
+            (lookup.report).error_help(span, message, "known: all, one");
             DirectStrategy::All
         }
     }
@@ -213,65 +186,48 @@ fn direct_strategy(lookup: &mut Lookup, report: &mut Report) -> DirectStrategy {
 /// Accelerators of pbrt-v3 and of Antumbra.
 pub(crate) const ACCELERATORS: &[&str] = &["bvh", "hbvh", "kdtree", "obvh", "qbvh"];
 
-/// Handles `Accelerator`. `orders` are the names that `"string order"` accepts.
+/// Reads an `Accelerator`. `orders` are the names that `"string order"` accepts.
 ///
 /// Names other than Antumbra's own leave the width to the program, because no picture depends on the accelerator.
-pub(crate) fn declare_accelerator(
-    at: Span,
-    kind: &Quoted,
-    params: &Params,
-    orders: &[&str],
-    report: &mut Report,
-) -> Accelerator {
-    const INTEGER: &[ParamType] = &[ParamType::Integer];
-    const FLOAT: &[ParamType] = &[ParamType::Float];
-    let mut lookup = Lookup::new(at, format!("accelerator {:?}", kind.text), params);
+pub(crate) fn accelerator(lookup: &mut Lookup, orders: &[&str]) -> Accelerator {
     let mut accelerator = Accelerator::default();
-    let mut left_out = |names: &[(&'static str, &'static [ParamType])]| {
-        for (name, types) in names {
-            let why = "the picture does not depend on it";
-            lookup.left_out(name, types, why, report);
-        }
-    };
-    match kind.text.as_str() {
-        "qbvh" => accelerator.width = Some(4),
-        "obvh" => accelerator.width = Some(8),
-        "hbvh" => accelerator.width = Some(16),
-        "bvh" => left_out(&[
-            ("maxnodeprims", INTEGER),
-            ("splitmethod", &[ParamType::String]),
-        ]),
-        "kdtree" => left_out(&[
+    let left_out: &[(&str, _)] = match lookup.kind.text.as_str() {
+        "bvh" => &[("maxnodeprims", INTEGER), ("splitmethod", STRING)],
+        "kdtree" => &[
             ("intersectcost", INTEGER),
             ("traversalcost", INTEGER),
             ("emptybonus", FLOAT),
             ("maxprims", INTEGER),
             ("maxdepth", INTEGER),
-        ]),
+        ],
+        _ => &[],
+    };
+    for (name, types) in left_out {
+        lookup.left_out(name, types, "the picture does not depend on it");
+    }
+    match lookup.kind.text.as_str() {
+        "qbvh" => accelerator.width = Some(4),
+        "obvh" => accelerator.width = Some(8),
+        "hbvh" => accelerator.width = Some(16),
+        "bvh" | "kdtree" => {}
         name => {
-            report.note(
-                kind.span,
-                format!(
-                    "unknown accelerator {name:?} is taken as auto, without its parameters; known: {}",
-                    ACCELERATORS.join(", ")
-                ),
+            let message = format!(
+                "unknown accelerator {name:?} is taken as auto, without its parameters; known: {}",
+                ACCELERATORS.join(", ")
             );
+            lookup.report.note(lookup.kind.span, message);
             lookup.ignore_all();
         }
     }
     if accelerator.width.is_some()
-        && let Some((order, span)) = lookup.string("order", report)
+        && let Some((order, span)) = lookup.string("order")
     {
         if orders.contains(&order) {
             accelerator.order = Some(order.to_owned());
         } else {
-            report.error_help(
-                span,
-                format!("unknown order {order:?}"),
-                format!("known: {}", orders.join(", ")),
-            );
+            let help = format!("known: {}", orders.join(", "));
+            (lookup.report).error_help(span, format!("unknown order {order:?}"), help);
         }
     }
-    lookup.finish(report);
     accelerator
 }

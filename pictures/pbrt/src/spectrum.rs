@@ -42,8 +42,7 @@ fn read_as(param: &Param, of: Of, report: &mut Report) -> Option<Rgb> {
         (Values::Broken, _) => return None,
         (Values::Strings(files), _) => of_file(param, files, of, report)?,
         (Values::Floats(values), _) if values.iter().any(|v| !v.is_finite()) => {
-            report.error(param.list, format!("{name:?} must be finite"));
-            return None;
+            return report.fail(param.list, format!("{name:?} must be finite"));
         }
         (Values::Floats(values), ParamType::Spectrum) if !values.is_empty() => {
             let pairs = values.chunks_exact(2);
@@ -58,11 +57,10 @@ fn read_as(param: &Param, of: Of, report: &mut Report) -> Option<Rgb> {
                 Some(space) => space * Vec3::new(r, g, b).as_dvec3(),
             },
             [r, g, b] => {
-                report.error(
+                return report.fail(
                     param.list,
                     format!("{name:?} must not be negative, found {r} {g} {b}"),
                 );
-                return None;
             }
             _ => return wrong_count(param, "three values", report),
         },
@@ -76,8 +74,7 @@ fn read_as(param: &Param, of: Of, report: &mut Report) -> Option<Rgb> {
     }
     let color = color.max(DVec3::ZERO).as_vec3();
     if !color.is_finite() {
-        report.error(param.list, format!("{name:?} overflows"));
-        return None;
+        return report.fail(param.list, format!("{name:?} overflows"));
     }
     Some(color)
 }
@@ -95,9 +92,10 @@ fn color_of(samples: Vec<[f64; 2]>, of: Of, report: &Report) -> DVec3 {
 fn of_file(param: &Param, files: &[String], of: Of, report: &mut Report) -> Option<DVec3> {
     let name = &param.name;
     let [file] = files else {
-        let message = format!("{name:?} takes one file, found {}", files.len());
-        report.error(param.list, message);
-        return None;
+        return report.fail(
+            param.list,
+            format!("{name:?} takes one file, found {}", files.len()),
+        );
     };
     let named = match report.is_version4 {
         true => named_spectra::find(file),
@@ -111,12 +109,11 @@ fn of_file(param: &Param, files: &[String], of: Of, report: &mut Report) -> Opti
         None => match read_spd(file, report) {
             Ok(samples) => samples,
             Err(message) => {
-                report.error_help(
+                return report.fail_help(
                     param.value,
                     format!("cannot read spectrum {file:?}: {message}"),
                     format!("without the file, write it as \"rgb {name}\""),
                 );
-                return None;
             }
         },
     };
@@ -135,8 +132,7 @@ fn black_body(param: &Param, values: &[f32], report: &mut Report) -> Option<DVec
         }
         [kelvin] | [kelvin, _] if !(kelvin > 0.0) => {
             let message = format!("temperature {kelvin} of {:?} must be positive", param.name);
-            report.error(param.value, message);
-            None
+            report.fail(param.value, message)
         }
         _ if is_version4 => wrong_count(param, "one temperature", report),
         _ => wrong_count(param, "a temperature and a scale", report),
@@ -144,15 +140,14 @@ fn black_body(param: &Param, values: &[f32], report: &mut Report) -> Option<DVec
 }
 
 fn wrong_count<T>(param: &Param, takes: &str, report: &mut Report) -> Option<T> {
-    report.error(
+    report.fail(
         param.list,
         format!(
             "{:?} takes {takes}, found {} values",
             param.name,
             param.values.len()
         ),
-    );
-    None
+    )
 }
 
 /// Converts XYZ to linear RGB with the primaries of sRGB and BT.709, by the matrix of pbrt-v3.

@@ -60,6 +60,13 @@ fn distance(a: &str, b: &str) -> usize {
     rows[a.len()][b.len()]
 }
 
+/// Advice as of [`help`] where the known names are keys of a map.
+pub(crate) fn among<'a>(name: &str, known: impl Iterator<Item = &'a String>) -> String {
+    let mut known: Vec<&str> = known.map(String::as_str).collect();
+    known.sort_unstable();
+    help(name, &known)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -89,7 +89,7 @@ static GROUPS: LazyLock<Vec<Group>> = LazyLock::new(|| {
         },
         Group {
             heading: "Lights",
-            supported: light::SUPPORTED.to_vec(),
+            supported: light::supported(),
             unsupported: &[],
             scene: r#"WorldBegin LightSource "NAME" WorldEnd"#,
         },

@@ -15,8 +15,10 @@ impl Builder<'_> {
     /// Returns true if a directive is allowed in the current section. Otherwise reports it.
     pub(super) fn check_phase(&self, at: Span, directive: &Directive, report: &mut Report) -> bool {
         if self.phase == Phase::Done {
-            let message = "directives after WorldEnd (several pictures in one file) are";
-            report.unsupported(at, message);
+            report.unsupported(
+                at,
+                "directives after WorldEnd (several pictures in one file) are",
+            );
             return false;
         }
         if directive.phase().is_none_or(|phase| phase == self.phase) {

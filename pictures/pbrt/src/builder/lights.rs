@@ -5,6 +5,7 @@ use antumbra_scene::Light;
 use super::Builder;
 use crate::directive::Quoted;
 use crate::light;
+use crate::lookup::read;
 use crate::params::Params;
 use crate::report::Report;
 use crate::source::Span;
@@ -17,7 +18,9 @@ impl Builder<'_> {
         transforms.set([start, end].map(|matrix| self.to_origin(matrix)));
         self.images.allowed = self.budget.left(report);
         let images = &mut self.images;
-        let light = light::declare(at, kind, params, &transforms, images, report);
+        let light = read("light", at, (kind, params), report, |lookup| {
+            light::read(lookup, &transforms, images)
+        });
         let bytes = size_of::<Light>() as u64 + self.images.newly_used();
         if self.budget.take(bytes, at, report) {
             self.lights.extend(light);

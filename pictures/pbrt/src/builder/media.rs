@@ -6,6 +6,7 @@ use antumbra_scene::{Integrator, Light, Medium, MediumInterface, Shape};
 
 use super::Builder;
 use crate::directive::Quoted;
+use crate::lookup::read;
 use crate::params::Params;
 use crate::report::Report;
 use crate::source::Span;
@@ -20,7 +21,10 @@ impl Builder<'_> {
         report: &mut Report,
     ) {
         let to_world = self.to_origin(self.state.now.transforms.start);
-        let Some(medium) = medium::declare(at, &name, params, &to_world, report) else {
+        let medium = read("medium", at, (&name, params), report, |lookup| {
+            medium::read(lookup, &to_world)
+        });
+        let Some(medium) = medium else {
             // Uses of the name are no further mistakes.
             self.media_indices.entry(name.text).or_insert(0);
             return;
@@ -61,12 +65,7 @@ impl Builder<'_> {
                 name.span,
                 format!("no medium is named {:?}", name.text),
                 "vacuum is taken",
-                || {
-                    let mut known: Vec<&str> =
-                        self.media_indices.keys().map(String::as_str).collect();
-                    known.sort_unstable();
-                    suggest::help(&name.text, &known)
-                },
+                || suggest::among(&name.text, self.media_indices.keys()),
             );
         }
         found

@@ -17,8 +17,10 @@ const ELLIPSOID: &str =
 impl Builder<'_> {
     pub(super) fn object_begin(&mut self, at: Span, name: Quoted, report: &mut Report) {
         if let Some(outer) = self.state.now.object {
-            let message = format!("ObjectBegin within that of line {}", outer.line);
-            report.error(at, message);
+            report.error(
+                at,
+                format!("ObjectBegin within that of line {}", outer.line),
+            );
         }
         self.begin_block(BlockKind::Object, at, report);
         // The name now refers to the new object. Earlier instances keep their object.
@@ -43,13 +45,9 @@ impl Builder<'_> {
             if report.is_counted_only() {
                 return;
             }
-            let mut known: Vec<&str> = self.object_indices.keys().map(String::as_str).collect();
-            known.sort_unstable();
-            report.error_once(
-                name.span,
-                format!("no object is named {:?}", name.text),
-                Some(&suggest::help(&name.text, &known)),
-            );
+            let help = suggest::among(&name.text, self.object_indices.keys());
+            let message = format!("no object is named {:?}", name.text);
+            report.error_once(name.span, message, Some(&help));
             return;
         };
         let has_spheres = self.objects[object].has_spheres();
@@ -79,19 +77,16 @@ impl Builder<'_> {
                 return None;
             }
             if to_world.row(3) != DVec4::W {
-                report.unsupported(at, "an instance under a perspective transformation is");
-                return None;
+                return report.refuse(at, "an instance under a perspective transformation is");
             }
             if transform::uniform_scale(&to_world).is_none() && has_spheres {
-                report.unsupported(at, ELLIPSOID);
-                return None;
+                return report.refuse(at, ELLIPSOID);
             }
             *place = Affine3::from_mat4(to_world.as_mat4());
         }
         let [world_from_object, end] = places;
         if transforms.mirror_differently() {
-            report.error_help(at, MIRRORS, MIRRORS_HELP);
-            return None;
+            return report.fail_help(at, MIRRORS, MIRRORS_HELP);
         }
         Some(Instance {
             object,

@@ -41,15 +41,13 @@ impl Builder<'_> {
         } = place;
         // The shape's lookup may fall back on parameters of the material, which must live as long.
         let current = self.state.now.material.clone();
-        let mut lookup = Lookup::new(at, format!("shape {:?}", kind.text), params);
         let mut values = Textured {
-            lookup: &mut lookup,
+            lookup: Lookup::new("shape", at, kind, params, report),
             state: &self.state,
-            report,
         };
-        let read = shape::read(kind, &mut values, &to_world, place.middle);
-        let material = material::of_shape(current.as_deref(), &mut lookup, &self.state, report);
-        lookup.finish(report);
+        let read = shape::read(&mut values, &to_world, place.middle);
+        let material = material::of_shape(current.as_deref(), &mut values);
+        values.lookup.finish();
         let Some((source, cutouts)) = read else {
             return;
         };

@@ -25,8 +25,10 @@ impl Builder<'_> {
         report: &mut Report,
     ) {
         if self.transforms().is_animated() {
-            let message = "textures do not move: the transformation at the start is taken";
-            report.note(at, message);
+            report.note(
+                at,
+                "textures do not move: the transformation at the start is taken",
+            );
         }
         self.pending_textures.push(texture::Declaration {
             at,

@@ -6,6 +6,7 @@ use glam::DMat4;
 
 use super::Builder;
 use crate::directive::Quoted;
+use crate::lookup::read;
 use crate::params::Params;
 use crate::report::Report;
 use crate::source::Span;
@@ -71,14 +72,9 @@ impl Builder<'_> {
                 if report.is_counted_only() {
                     return;
                 }
-                let mut known: Vec<&str> =
-                    self.coordinate_systems.keys().map(String::as_str).collect();
-                known.sort_unstable();
-                report.error_help(
-                    name.span,
-                    format!("no coordinate system is named {:?}", name.text),
-                    suggest::help(&name.text, &known),
-                );
+                let message = format!("no coordinate system is named {:?}", name.text);
+                let help = suggest::among(&name.text, self.coordinate_systems.keys());
+                report.error_help(name.span, message, help);
             }
         }
     }
@@ -86,7 +82,9 @@ impl Builder<'_> {
     pub(super) fn camera(&mut self, at: Span, kind: &Quoted, params: &Params, report: &mut Report) {
         let transforms = self.state.now.transforms;
         let origin = self.options.origin;
-        let (camera, places) = camera::declare(at, kind, params, (&transforms, origin), report);
+        let (camera, places) = read("camera", at, (kind, params), report, |lookup| {
+            camera::read(lookup, &transforms, origin)
+        });
         self.camera = camera;
         if self.is_version4 {
             self.camera.medium = self.medium(1, report);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use antumbra_scene::{Camera, LensElement, LensSystem, Projection};
 
-use crate::lookup::Lookup;
+use crate::lookup::{Lookup, POSITIVE};
 use crate::number::parse_float;
 use crate::params::shorten;
 use crate::report::Report;
@@ -20,16 +20,14 @@ const MAX_FILE: u64 = 1 << 20;
 const MAX_ELEMENTS: usize = 256;
 
 /// Reads a `realistic`. Mistakes are reported, and replaced by the default camera.
-pub(super) fn realistic(lookup: &mut Lookup, report: &mut Report) -> Camera {
-    let shutter = super::shutter(lookup, report);
-    let positive = [f32::MIN_POSITIVE, f32::MAX];
-    let diameter = lookup.float_in("aperturediameter", 1.0, positive, report);
-    let focus_distance = lookup.float_in("focusdistance", 10.0, positive, report);
-    let is_simple = lookup.bool("simpleweighting", true, report);
-    let Some((name, span)) = lookup.needed_string("lensfile", report) else {
-        return Camera::default();
-    };
-    let Some(mut elements) = read(name, span, report) else {
+pub(super) fn realistic(lookup: &mut Lookup) -> Camera {
+    let shutter = super::shutter(lookup);
+    let diameter = lookup.float_in("aperturediameter", 1.0, POSITIVE);
+    let focus_distance = lookup.float_in("focusdistance", 10.0, POSITIVE);
+    let is_simple = lookup.bool("simpleweighting", true);
+    let named = lookup.needed_string("lensfile");
+    let read = named.and_then(|(name, span)| Some((name, read(name, span, lookup.report)?)));
+    let Some((name, mut elements)) = read else {
         return Camera::default();
     };
     for stop in elements.iter_mut().filter(|element| element.radius == 0.0) {
@@ -38,7 +36,7 @@ pub(super) fn realistic(lookup: &mut Lookup, report: &mut Report) -> Camera {
             let message = format!(
                 "\"aperturediameter\" {diameter} is taken as {most}, the largest of {name:?}"
             );
-            report.note(lookup.at, message);
+            lookup.note(message);
         } else {
             stop.diameter = diameter;
         }
@@ -46,7 +44,7 @@ pub(super) fn realistic(lookup: &mut Lookup, report: &mut Report) -> Camera {
     if is_simple {
         let message = "with \"simpleweighting\" the picture gets darker towards its edges, and its brightness \
                        varies a little with the aperture, as in pbrt-v3";
-        report.note(lookup.at, message);
+        lookup.note(message);
     }
     Camera {
         shutter,
@@ -69,8 +67,8 @@ fn read(name: &str, span: Span, report: &mut Report) -> Option<Vec<LensElement>>
         Ok(bytes) => bytes,
         Err(error) => {
             let help = "paths start at the folder of the main scene file";
-            report.error_help(span, format!("cannot read lens {name:?}: {error}"), help);
-            return None;
+            let message = format!("cannot read lens {name:?}: {error}");
+            return report.fail_help(span, message, help);
         }
     };
     report.sources.note(path);
@@ -78,8 +76,7 @@ fn read(name: &str, span: Span, report: &mut Report) -> Option<Vec<LensElement>>
         Ok(elements) => Some(elements),
         Err(problem) => {
             let help = "a surface is its radius, thickness, index of refraction and diameter, in millimetres";
-            report.error_help(span, format!("lens {name:?}: {problem}"), help);
-            None
+            report.fail_help(span, format!("lens {name:?}: {problem}"), help)
         }
     }
 }

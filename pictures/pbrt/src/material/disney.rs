@@ -14,16 +14,14 @@ pub(super) fn disney(values: &mut Textured) -> Material {
 
 /// Body below the surface. As in pbrt-v3, sheets scatter no light inside, and only sheets let diffuse light through.
 fn body(values: &mut Textured, clear: &Param<f32>) -> DisneyBody {
-    let is_thin = values.lookup.bool("thin", false, values.report);
+    let is_thin = values.bool("thin", false);
     let flatness = values.limited("flatness", Limit::SHARE);
     let diffuse_transmission = values.limited("difftrans", Limit::UpTo(2.0));
     let scatter_distance: Param<Rgb> = values.param("scatterdistance", 0.0);
     let scatters = scatter_distance.constant() != Some(&Rgb::ZERO);
-    let at = values.lookup.at;
     if is_thin {
         if scatters {
-            let message = "\"scatterdistance\" is left out where \"thin\" is true, as in pbrt-v3";
-            values.report.note(at, message);
+            values.note("\"scatterdistance\" is left out where \"thin\" is true, as in pbrt-v3");
         }
         return DisneyBody::Thin {
             flatness: flatness.unwrap_or(0.0.into()),
@@ -31,19 +29,19 @@ fn body(values: &mut Textured, clear: &Param<f32>) -> DisneyBody {
         };
     }
     for name in ["flatness", "difftrans"] {
-        if values.lookup.has(name) {
-            let message = format!("{name:?} is left out where \"thin\" is false, as in pbrt-v3");
-            values.report.note(at, message);
+        if values.has(name) {
+            values.note(format!(
+                "{name:?} is left out where \"thin\" is false, as in pbrt-v3"
+            ));
         }
     }
     if scatters {
         let message =
             "subsurface scattering is rendered by walks inside of shapes, which must be closed";
-        values.report.note(at, message);
+        values.note(message);
     }
     if scatters && clear.constant() != Some(&0.0) {
-        let feature = "\"scatterdistance\" together with \"spectrans\" is";
-        values.report.unsupported(at, feature);
+        values.unsupported("\"scatterdistance\" together with \"spectrans\" is");
         return DisneyBody::default();
     }
     DisneyBody::Solid { scatter_distance }

@@ -7,31 +7,29 @@ use antumbra_scene::{Material, Param, Rgb};
 
 use crate::texture::Textured;
 
-impl Textured<'_, '_> {
+impl Textured<'_> {
     /// Number in a range. `None`: it is not given, or a mistake was reported.
     pub fn limited(&mut self, name: &'static str, limit: Limit) -> Option<Param<f32>> {
-        let (found, span) = self.find(name)?;
+        let (found, span) = self.textured(name)?;
         let Param::Constant(value) = found else {
             return Some(found);
         };
         let report = &mut *self.report;
         match limit {
-            Limit::Rough if value < 0.0 => {
-                report.error(
-                    span,
-                    format!("{name:?} must not be negative, found {value}"),
-                );
-                None
-            }
+            Limit::Rough if value < 0.0 => report.fail(
+                span,
+                format!("{name:?} must not be negative, found {value}"),
+            ),
             Limit::Index if !(value > 0.0) => {
                 let message = format!("the index of refraction must be positive, found {value}");
-                report.error(span, message);
-                None
+                report.fail(span, message)
             }
             Limit::Angle if !(0.0..=90.0).contains(&value) => {
                 let clamped = value.clamp(0.0, 90.0);
-                let message = format!("{name} {value} is taken as {clamped}, as pbrt does");
-                report.note(span, message);
+                report.note(
+                    span,
+                    format!("{name} {value} is taken as {clamped}, as pbrt does"),
+                );
                 Some(clamped.into())
             }
             Limit::UpTo(most) if !(0.0..=most).contains(&value) => {
@@ -47,9 +45,9 @@ impl Textured<'_, '_> {
     }
 }
 
-impl Reader for Textured<'_, '_> {
+impl Reader for Textured<'_> {
     fn color(&mut self, source: &Source<Rgb>) -> Param<Rgb> {
-        let found = source.names.iter().find_map(|name| self.find(name));
+        let found = source.names.iter().find_map(|name| self.textured(name));
         found.map_or(source.default.into(), |(value, _)| value)
     }
 
@@ -59,14 +57,14 @@ impl Reader for Textured<'_, '_> {
             // What comes after the first is known, but has no effect.
             match found {
                 None => found = self.limited(name, source.limit),
-                Some(_) => drop(self.find::<f32>(name)),
+                Some(_) => drop(self.textured::<f32>(name)),
             }
         }
         found.unwrap_or(source.default.into())
     }
 
     fn switch(&mut self, (name, default): (&'static str, bool)) -> bool {
-        self.lookup.bool(name, default, self.report)
+        self.bool(name, default)
     }
 }
 

@@ -4,6 +4,7 @@ use antumbra_scene::material::Subsurface;
 use antumbra_scene::{Interior, Material, Param, Rgb};
 
 use super::{remap_roughness, roughness_along};
+use crate::lookup::{Lookup, POSITIVE};
 use crate::presets;
 use crate::suggest;
 use crate::texture::Textured;
@@ -12,7 +13,7 @@ use crate::texture::Textured;
 pub(super) fn coefficients(values: &mut Textured) -> Material {
     let mut found = presets::DEFAULT;
     let mut asymmetry = asymmetry(values);
-    let named = values.lookup.string("name", values.report);
+    let named = values.string("name");
     if let Some((name, span)) = named.filter(|(name, _)| !name.is_empty()) {
         match presets::by_name(name) {
             Some(preset) => {
@@ -42,8 +43,7 @@ pub(super) fn diffuse(values: &mut Textured) -> Material {
     if let Param::Constant(path) = mean_free_path
         && path.min_element() <= 0.0
     {
-        let message = format!("\"mfp\" must be positive, found {path}");
-        values.report.error(values.lookup.at, message);
+        values.error(format!("\"mfp\" must be positive, found {path}"));
     }
     let interior = Interior::Diffuse {
         reflectance: color(values, "Kd", Rgb::splat(0.5)),
@@ -55,12 +55,9 @@ pub(super) fn diffuse(values: &mut Textured) -> Material {
 }
 
 fn body(values: &mut Textured, interior: Interior, asymmetry: f32) -> Material {
-    let range = [f32::MIN_POSITIVE, f32::MAX];
-    let eta = values.lookup.float_in("eta", 1.33, range, values.report);
-    values.report.note(
-        values.lookup.at,
-        "subsurface scattering is rendered by walks inside of shapes, which must be closed",
-    );
+    let eta = values.float_in("eta", 1.33, POSITIVE);
+    values
+        .note("subsurface scattering is rendered by walks inside of shapes, which must be closed");
     Material::Subsurface(Subsurface {
         kr: values.param("Kr", 1.0),
         kt: values.param("Kt", 1.0),
@@ -73,21 +70,19 @@ fn body(values: &mut Textured, interior: Interior, asymmetry: f32) -> Material {
 }
 
 pub(super) fn color(values: &mut Textured, name: &'static str, default: Rgb) -> Param<Rgb> {
-    let found = values.find(name);
+    let found = values.textured(name);
     found.map_or(Param::Constant(default), |(value, _)| value)
 }
 
-fn scale(values: &mut Textured) -> f32 {
-    let range = [f32::MIN_POSITIVE, f32::MAX];
-    values.lookup.float_in("scale", 1.0, range, values.report)
+fn scale(lookup: &mut Lookup) -> f32 {
+    lookup.float_in("scale", 1.0, POSITIVE)
 }
 
-fn asymmetry(values: &mut Textured) -> f32 {
-    let found = values.lookup.float("g", 0.0, values.report);
+fn asymmetry(lookup: &mut Lookup) -> f32 {
+    let found = lookup.float("g", 0.0);
     if found.abs() < 1.0 {
         return found;
     }
-    let message = format!("\"g\" must be between -1 and 1, found {found}");
-    values.report.error(values.lookup.at, message);
+    lookup.error(format!("\"g\" must be between -1 and 1, found {found}"));
     0.0
 }

@@ -63,7 +63,7 @@ pub(super) fn build(name: &str, values: &mut Textured) -> Option<Material> {
 
 /// Diffuse light on both sides. Together they must not gain energy, which pbrt-v4 does not check.
 fn diffuse_transmission(values: &mut Textured) -> Material {
-    let scale = values.lookup.float("scale", 1.0, values.report);
+    let scale = values.float("scale", 1.0);
     Material::Translucent(Translucent {
         kd: Rgb::splat(scale).into(),
         ks: Rgb::ZERO.into(),
@@ -76,7 +76,7 @@ fn diffuse_transmission(values: &mut Textured) -> Material {
 
 /// Index of refraction: a number, a glass by its name, or a spectrum, which then has one index for all colours.
 fn index(values: &mut Textured, name: &'static str) -> Param<f32> {
-    if values.find::<f32>(name).is_some() {
+    if values.textured::<f32>(name).is_some() {
         return values.limited(name, Limit::Index).unwrap_or(1.5.into());
     }
     let Some(param) = values.lookup.find(name, &[ParamType::Spectrum]) else {
@@ -100,8 +100,10 @@ fn index(values: &mut Textured, name: &'static str) -> Param<f32> {
             (index as f32).into()
         }
         None => {
-            let feature = "a spectrum from a file as an index of refraction is";
-            values.report.unsupported(param.value, feature);
+            values.report.unsupported(
+                param.value,
+                "a spectrum from a file as an index of refraction is",
+            );
             1.5.into()
         }
     }
@@ -109,7 +111,7 @@ fn index(values: &mut Textured, name: &'static str) -> Param<f32> {
 
 /// Microfacet alphas along u and v: square roots of the roughness, unless `remaproughness` is off.
 fn alphas(values: &mut Textured, [both, u, v]: [&'static str; 3], default: f32) -> [Param<f32>; 2] {
-    let remap = values.lookup.bool("remaproughness", true, values.report);
+    let remap = values.bool("remaproughness", true);
     let all = optional_roughness(values, both).unwrap_or(default.into());
     [u, v].map(|name| {
         let roughness = optional_roughness(values, name).unwrap_or_else(|| all.clone());
@@ -131,9 +133,9 @@ fn metal(values: &mut Textured, name: &'static str, copper: &str) -> Param<Rgb> 
 }
 
 fn conductor(values: &mut Textured, roughness: [Param<f32>; 2]) -> Material {
-    let reflectance = values.find::<Rgb>("reflectance");
+    let reflectance = values.textured::<Rgb>("reflectance");
     if let Some((_, span)) = reflectance
-        && (values.lookup.has("eta") || values.lookup.has("k"))
+        && (values.has("eta") || values.has("k"))
     {
         let message = "a conductor has \"reflectance\", or \"eta\" and \"k\", not both";
         values.report.error(span, message);
@@ -177,34 +179,30 @@ fn absorption_of(reflectance: Rgb) -> Rgb {
 
 /// Refuses a medium between coat and base, and leaves out how pbrt-v4 walks between them.
 fn layers(values: &mut Textured) {
-    let albedo = values.find::<Rgb>("albedo");
+    let albedo = values.textured::<Rgb>("albedo");
     if albedo.is_some_and(|(albedo, _)| albedo.constant() != Some(&Rgb::ZERO)) {
-        let feature = "a medium between coat and base (\"albedo\") is";
-        values.report.unsupported(values.lookup.at, feature);
+        values.unsupported("a medium between coat and base (\"albedo\") is");
     }
     // Without a medium, these change noise only.
-    let _ = values.find::<f32>("g");
+    let _ = values.textured::<f32>("g");
     for steps in ["maxdepth", "nsamples"] {
-        let _ = values.lookup.integer_from(steps, 1, 0, values.report);
+        let _ = values.integer_from(steps, 1, 0);
     }
 }
 
 fn coated_diffuse(values: &mut Textured) -> Material {
     layers(values);
-    let _ = values.find::<f32>("thickness");
+    let _ = values.textured::<f32>("thickness");
     let [u, v] = alphas(values, ["roughness", "uroughness", "vroughness"], 0.0);
     let roughness = match (u, v) {
         (Param::Constant(u), Param::Constant(v)) if u != v => {
-            values.report.note(
-                values.lookup.at,
-                "coateddiffuse has one roughness: the geometric mean of both",
-            );
+            values.note("coateddiffuse has one roughness: the geometric mean of both");
             (u * v).sqrt().into()
         }
         (u, v) => {
             if u != v {
-                let feature = "coateddiffuse with a texture of roughness along u or v alone is";
-                values.report.unsupported(values.lookup.at, feature);
+                values
+                    .unsupported("coateddiffuse with a texture of roughness along u or v alone is");
             }
             u
         }
@@ -218,8 +216,8 @@ fn coated_diffuse(values: &mut Textured) -> Material {
 
 fn coated_conductor(values: &mut Textured) -> Material {
     layers(values);
-    let _ = values.find::<f32>("thickness");
-    let _ = values.find::<f32>("interface.thickness");
+    let _ = values.textured::<f32>("thickness");
+    let _ = values.textured::<f32>("interface.thickness");
     let coat_names = [
         "interface.roughness",
         "interface.uroughness",
@@ -233,13 +231,14 @@ fn coated_conductor(values: &mut Textured) -> Material {
     let coat_roughness = alphas(values, coat_names, 0.0);
     let roughness = alphas(values, names, 0.0);
     let coat_eta = index(values, "interface.eta");
-    let (eta, k) = match values.find::<Rgb>("reflectance") {
+    let (eta, k) = match values.textured::<Rgb>("reflectance") {
         Some((Param::Constant(reflectance), _)) => {
             (Rgb::ONE.into(), absorption_of(reflectance).into())
         }
         Some((Param::Texture(_), span)) => {
-            let feature = "a texture of the reflectance of coatedconductor is";
-            values.report.unsupported(span, feature);
+            values
+                .report
+                .unsupported(span, "a texture of the reflectance of coatedconductor is");
             (Rgb::ONE.into(), Rgb::ONE.into())
         }
         None => (

@@ -3,51 +3,42 @@
 use antumbra_scene::TriangleMesh;
 use glam::{DVec3, Vec2};
 
-use super::mesh::{MAX_SUBDIVIDED, UV, check_count, check_indices};
-use crate::lookup::Lookup;
-use crate::params::{Param, ParamType, Values};
-use crate::report::Report;
+use super::mesh::{MAX_SUBDIVIDED, UV, check_count, check_indices, floats};
+use crate::lookup::{INTEGER, Lookup};
+use crate::params::ParamType;
 use crate::transform;
 
 /// Cells along each side of a patch that is no parallelogram.
 const CELLS: usize = 16;
 
 /// Reads the patches of a `bilinearmesh`, in object space and measured from `middle`. `None`: a mistake was reported.
-pub(super) fn bilinear_mesh(
-    lookup: &mut Lookup,
-    middle: DVec3,
-    report: &mut Report,
-) -> Option<TriangleMesh> {
-    let errors_before = report.error_count();
-    let points = lookup.needed("P", &[ParamType::Point3], "point3", report);
+pub(super) fn bilinear_mesh(lookup: &mut Lookup, middle: DVec3) -> Option<TriangleMesh> {
+    let errors_before = lookup.report.error_count();
+    let points = lookup.find("P", &[ParamType::Point3]);
     let normals = lookup.find("N", &[ParamType::Normal]);
     let uvs = lookup.find("uv", UV);
-    let indices = lookup.find("indices", &[ParamType::Integer]);
-    let Values::Points(positions) = &points?.values else {
-        return None;
-    };
-    let positions: Vec<DVec3> = positions.chunks_exact(3).map(DVec3::from_slice).collect();
+    let indices = lookup.find("indices", INTEGER);
+    if points.is_none() {
+        lookup.report_missing("P", "point3");
+    }
+    let positions: Vec<DVec3> = points?.values.points()?.collect();
     for (param, components) in [(normals, 3), (uvs, 2)] {
-        if let Some(param) = param {
-            check_count(param, components, positions.len(), report);
-        }
+        check_count(lookup, param, components, positions.len());
     }
     // A single patch needs no indices.
-    let corners = match indices.map(|param| (param, &param.values)) {
-        Some((param, Values::Integers(values))) => {
-            check_indices(param, values, (4, "patches"), positions.len(), report);
-            values.clone()
+    let corners = match indices {
+        Some(param) => {
+            let values = param.values.integers()?;
+            check_indices(lookup, param, (4, "patches"), positions.len());
+            values
         }
-        Some(_) => return None,
-        None if positions.len() == 4 => vec![0, 1, 2, 3],
+        None if positions.len() == 4 => &[0, 1, 2, 3],
         None => {
-            lookup.report_missing("indices", "integer", report);
+            lookup.report_missing("indices", "integer");
             return None;
         }
     };
-    if report.error_count() > errors_before {
-        return None;
-    }
+    lookup.report.clean_since(errors_before)?;
     let (normals, uvs) = (floats(normals), floats(uvs));
     let mut mesh = TriangleMesh::default();
     for corners in corners.chunks_exact(4) {
@@ -61,23 +52,14 @@ pub(super) fn bilinear_mesh(
             uvs => at.map(|k| Vec2::new(uvs[2 * k], uvs[2 * k + 1])),
         };
         patch(&mut mesh, p.map(|p| p - middle), n, uv);
-        if mesh.bytes() > report.sources.limit.min(MAX_SUBDIVIDED) {
-            report.error_help(
-                lookup.at,
+        if mesh.bytes() > lookup.report.sources.limit.min(MAX_SUBDIVIDED) {
+            return lookup.fail_help(
                 "the patches make more triangles than memory allows",
                 "take fewer patches, or allow more memory",
             );
-            return None;
         }
     }
     Some(mesh)
-}
-
-fn floats(param: Option<&Param>) -> &[f32] {
-    match param.map(|param| &param.values) {
-        Some(Values::Floats(values)) => values,
-        _ => &[],
-    }
 }
 
 /// Adds a patch with the corners at (0, 0), (1, 0), (0, 1) and (1, 1).

@@ -8,9 +8,8 @@ use antumbra_scene::{CurveProfile, Curves, Geometry};
 use glam::DVec3;
 
 use super::ribbon;
-use crate::lookup::Lookup;
-use crate::params::{ParamType, Values};
-use crate::report::Report;
+use crate::lookup::{Lookup, NOT_NEGATIVE};
+use crate::params::ParamType;
 
 /// Largest number of segments of a curve. Each becomes up to 256 pieces.
 const MAX_SEGMENTS: usize = 1 << 14;
@@ -19,42 +18,37 @@ const MAX_SEGMENTS: usize = 1 << 14;
 pub(super) type Bezier = [DVec3; 4];
 
 /// Reads a `curve`, whose points are measured from `middle` before they are rounded. `None`: a mistake was reported.
-pub(super) fn curve(lookup: &mut Lookup, middle: DVec3, report: &mut Report) -> Option<Geometry> {
+pub(super) fn curve(lookup: &mut Lookup, middle: DVec3) -> Option<Geometry> {
     let kinds = [
         ("flat", Some(CurveProfile::Flat)),
         ("cylinder", Some(CurveProfile::Round)),
         ("ribbon", None),
     ];
-    let profile = lookup.choice("type", kinds, report);
-    let range = [0.0, f32::MAX];
-    let width = lookup.float_in("width", 1.0, range, report);
+    let profile = lookup.choice("type", kinds);
+    let width = lookup.float_in("width", 1.0, NOT_NEGATIVE);
     let widths = [
-        lookup.float_in("width0", width, range, report),
-        lookup.float_in("width1", width, range, report),
+        lookup.float_in("width0", width, NOT_NEGATIVE),
+        lookup.float_in("width1", width, NOT_NEGATIVE),
     ]
     .map(f64::from);
     let why = "curves are divided as finely as they are curved";
     let types = &[ParamType::Integer, ParamType::Float];
-    lookup.left_out("splitdepth", types, why, report);
-    let errors_before = report.error_count();
-    let mut segments = segments(lookup, report)?;
+    lookup.left_out("splitdepth", types, why);
+    let errors_before = lookup.report.error_count();
+    let mut segments = segments(lookup)?;
     if segments.len() > MAX_SEGMENTS {
         let count = segments.len();
-        let message = format!("a curve has {MAX_SEGMENTS} segments at most, found {count}");
-        report.error(lookup.at, message);
-        return None;
+        return lookup.fail(format!(
+            "a curve has {MAX_SEGMENTS} segments at most, found {count}"
+        ));
     }
-    let normals = triples(lookup, "N", &[ParamType::Normal], report);
-    if report.error_count() > errors_before {
-        return None;
-    }
+    let normals = triples(lookup, "N", &[ParamType::Normal]);
+    lookup.report.clean_since(errors_before)?;
     if widths == [0.0; 2] {
-        report.error(lookup.at, format!("{} has no width", lookup.what()));
-        return None;
+        return lookup.fail(format!("{} has no width", lookup.what()));
     }
     if (normals.iter().flatten()).any(|normal| *normal == DVec3::ZERO) {
-        report.error(lookup.at, "a normal \"N\" is zero, so it has no direction");
-        return None;
+        return lookup.fail("a normal \"N\" is zero, so it has no direction");
     }
     for point in segments.iter_mut().flatten() {
         *point -= middle;
@@ -68,9 +62,9 @@ pub(super) fn curve(lookup: &mut Lookup, middle: DVec3, report: &mut Report) -> 
         )),
         (None, found) => {
             let (found, needed) = (found.map_or(0, |n| n.len()), segments.len() + 1);
-            let message = format!("a ribbon needs {needed} normals \"N\", found {found}");
-            report.error(lookup.at, message);
-            None
+            lookup.fail(format!(
+                "a ribbon needs {needed} normals \"N\", found {found}"
+            ))
         }
     }
 }
@@ -96,18 +90,16 @@ fn curves(segments: &[Bezier], widths: [f64; 2], profile: CurveProfile) -> Curve
 }
 
 /// Reads the control points as cubic Bézier curves, each of which begins where the previous one ends.
-fn segments(lookup: &mut Lookup, report: &mut Report) -> Option<Vec<Bezier>> {
-    let degree = lookup.integer_from("degree", 3, 2, report) as usize;
-    let is_spline = lookup.choice("basis", [("bezier", false), ("bspline", true)], report);
+fn segments(lookup: &mut Lookup) -> Option<Vec<Bezier>> {
+    let degree = lookup.integer_from("degree", 3, 2) as usize;
+    let is_spline = lookup.choice("basis", [("bezier", false), ("bspline", true)]);
     if degree > 3 {
-        let message = format!("curves have degree 2 or 3, found {degree}");
-        report.error(lookup.at, message);
-        return None;
+        return lookup.fail(format!("curves have degree 2 or 3, found {degree}"));
     }
-    let Some(points) = triples(lookup, "P", &[ParamType::Point3], report) else {
+    let Some(points) = triples(lookup, "P", &[ParamType::Point3]) else {
         if !lookup.has("P") {
             let message = format!("{} needs a parameter \"P\"", lookup.what());
-            report.error_help(lookup.at, message, "add \"point P\"");
+            lookup.error_help(message, "add \"point P\"");
         }
         return None;
     };
@@ -118,9 +110,9 @@ fn segments(lookup: &mut Lookup, report: &mut Report) -> Option<Vec<Bezier>> {
             true => format!("at least {}", degree + 1),
             false => format!("{} and any number of times {degree} more", degree + 1),
         };
-        let message = format!("{count} points \"P\" make no curve; a curve needs {needed}");
-        report.error(lookup.at, message);
-        return None;
+        return lookup.fail(format!(
+            "{count} points \"P\" make no curve; a curve needs {needed}"
+        ));
     }
     let step = if is_spline { 1 } else { degree };
     let windows = points.windows(degree + 1).step_by(step);
@@ -149,17 +141,11 @@ fn triples(
     lookup: &mut Lookup,
     name: &'static str,
     types: &'static [ParamType],
-    report: &mut Report,
 ) -> Option<Vec<DVec3>> {
     let param = lookup.find(name, types)?;
-    let values = match &param.values {
-        Values::Points(values) => values.clone(),
-        Values::Floats(values) => values.iter().copied().map(f64::from).collect(),
-        _ => return None,
-    };
+    let values = param.values.doubles()?;
     if !values.iter().all(|v| v.is_finite()) {
-        report.error(param.list, format!("{name:?} must be finite"));
-        return None;
+        return (lookup.report).fail(param.list, format!("{name:?} must be finite"));
     }
     Some(values.chunks_exact(3).map(DVec3::from_slice).collect())
 }

@@ -25,7 +25,6 @@ use glam::{DMat4, DVec3};
 pub(crate) use mesh::Cutouts;
 use quadric::Tessellation;
 
-use crate::directive::Quoted;
 use crate::mesh_file::MeshFile;
 use crate::texture::Textured;
 
@@ -59,7 +58,6 @@ pub(crate) enum Source {
 ///
 /// `None`: a mistake was reported.
 pub(crate) fn read(
-    kind: &Quoted,
     values: &mut Textured,
     to_world: &DMat4,
     middle: DVec3,
@@ -69,27 +67,27 @@ pub(crate) fn read(
     let tessellation = Tessellation::of(is_emitter);
     let from_middle = to_world * DMat4::from_translation(middle);
     // Only meshes given as triangles can have alpha masks, as in pbrt-v3.
-    let cutouts = match kind.text.as_str() {
+    let kind = values.kind.text.as_str();
+    let cutouts = match kind {
         "trianglemesh" | "plymesh" => mesh::cutouts(values),
-        "bilinearmesh" if values.report.is_version4 => mesh::cutouts(values),
+        "bilinearmesh" if values.is_version4() => mesh::cutouts(values),
         _ => Cutouts::default(),
     };
-    let Textured { lookup, report, .. } = values;
-    let (mut mesh, to_world) = match kind.text.as_str() {
-        "trianglemesh" => (mesh::triangle_mesh(lookup, middle, report)?, &from_middle),
-        "loopsubdiv" => (mesh::subdivided(lookup, middle, report)?, &from_middle),
-        "bilinearmesh" if report.is_version4 => (
-            bilinear::bilinear_mesh(lookup, middle, report)?,
-            &from_middle,
-        ),
+    let lookup = &mut values.lookup;
+    let (mut mesh, to_world) = match kind {
+        "trianglemesh" => (mesh::triangle_mesh(lookup, middle)?, &from_middle),
+        "loopsubdiv" => (mesh::subdivided(lookup, middle)?, &from_middle),
+        "bilinearmesh" if lookup.is_version4() => {
+            (bilinear::bilinear_mesh(lookup, middle)?, &from_middle)
+        }
         "plymesh" => {
-            let file = mesh::ply_mesh(lookup, (to_world, middle), report)?;
+            let file = mesh::ply_mesh(lookup, (to_world, middle))?;
             return Some((Source::File(file), cutouts));
         }
         "curve" => {
-            let mut geometry = curve::curve(lookup, middle, report)?;
+            let mut geometry = curve::curve(lookup, middle)?;
             if is_emitter {
-                report.unsupported(lookup.at, "an area light on a curve is");
+                lookup.unsupported("an area light on a curve is");
             }
             match &mut geometry {
                 Geometry::Curves(curves) => Arc::make_mut(curves).transform(&from_middle),
@@ -99,29 +97,23 @@ pub(crate) fn read(
             return Some((Source::Here(geometry), cutouts));
         }
         "sphere" => {
-            let geometry = sphere::sphere(lookup, to_world, tessellation, report)?;
+            let geometry = sphere::sphere(lookup, to_world, tessellation)?;
             return Some((Source::Here(geometry), cutouts));
         }
-        "cylinder" => (quadric::cylinder(lookup, tessellation, report)?, to_world),
-        "disk" => (quadric::disk(lookup, tessellation, report)?, to_world),
-        "cone" => (revolved::cone(lookup, tessellation, report)?, to_world),
-        "paraboloid" => (
-            revolved::paraboloid(lookup, tessellation, report)?,
-            to_world,
-        ),
-        "hyperboloid" => (
-            revolved::hyperboloid(lookup, tessellation, report)?,
-            to_world,
-        ),
-        "heightfield" => (heightfield::heightfield(lookup, report)?, to_world),
-        "nurbs" => (nurbs::nurbs(lookup, report)?, to_world),
-        name => {
-            lookup.ignore_all();
-            let known = match report.is_version4 {
-                true => [SUPPORTED, SUPPORTED4].concat(),
-                false => SUPPORTED.to_vec(),
+        "cylinder" => (quadric::cylinder(lookup, tessellation)?, to_world),
+        "disk" => (quadric::disk(lookup, tessellation)?, to_world),
+        "cone" => (revolved::cone(lookup, tessellation)?, to_world),
+        "paraboloid" => (revolved::paraboloid(lookup, tessellation)?, to_world),
+        "hyperboloid" => (revolved::hyperboloid(lookup, tessellation)?, to_world),
+        "heightfield" => (heightfield::heightfield(lookup)?, to_world),
+        "nurbs" => (nurbs::nurbs(lookup)?, to_world),
+        _ => {
+            let more = if lookup.is_version4() {
+                SUPPORTED4
+            } else {
+                &[]
             };
-            report.unknown(kind.span, "shape", name, &known);
+            lookup.unknown(&[SUPPORTED, more].concat());
             return None;
         }
     };

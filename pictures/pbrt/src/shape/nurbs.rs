@@ -3,9 +3,8 @@
 use antumbra_scene::TriangleMesh;
 use glam::{DVec3, DVec4, Vec2};
 
-use crate::lookup::Lookup;
-use crate::params::{Param, ParamType, Values};
-use crate::report::Report;
+use crate::lookup::{FLOAT, INTEGER, Lookup};
+use crate::params::ParamType;
 use crate::shape::grid;
 
 /// Vertices along a side.
@@ -31,55 +30,42 @@ const V: Names = ["nv", "vorder", "vknots", "v0", "v1"];
 
 impl Basis {
     /// Reads the parameters of a side. `None`: a mistake was reported.
-    fn read(
-        lookup: &mut Lookup,
-        [points, order, knots, start, end]: Names,
-        report: &mut Report,
-    ) -> Option<Self> {
-        let errors_before = report.error_count();
+    fn read(lookup: &mut Lookup, [points, order, knots, start, end]: Names) -> Option<Self> {
+        let errors_before = lookup.report.error_count();
         for name in [points, order] {
-            lookup.needed(name, &[ParamType::Integer], "integer", report);
+            lookup.needed(name, INTEGER);
         }
         let order_name = order;
-        let count = lookup.integer_in(points, 2, [2, MAX_POINTS], report) as usize;
-        let order = lookup.integer_in(order, 2, [2, MAX_ORDER], report) as usize;
-        let param = lookup.needed(knots, &[ParamType::Float], "float", report)?;
-        let Values::Floats(values) = &param.values else {
-            return None;
-        };
-        if report.error_count() > errors_before {
-            return None;
-        }
+        let count = lookup.integer_in(points, 2, [2, MAX_POINTS]) as usize;
+        let order = lookup.integer_in(order, 2, [2, MAX_ORDER]) as usize;
+        let param = lookup.needed(knots, FLOAT)?;
+        let values = param.values.floats()?;
+        lookup.report.clean_since(errors_before)?;
         if count < order {
-            let message = format!("{points:?} is {count}, less than {order_name:?}, {order}");
-            report.error(lookup.at, message);
-            return None;
+            return lookup.fail(format!(
+                "{points:?} is {count}, less than {order_name:?}, {order}"
+            ));
         }
         if values.len() != count + order {
             let wanted = format!("{points:?} + {order_name:?} = {count} + {order}");
             let message = format!("{knots:?} has {} values, not {wanted}", values.len());
-            report.error(param.list, message);
-            return None;
+            return lookup.report.fail(param.list, message);
         }
         let descends = |pair: &[f32]| !(pair[0] <= pair[1] && (pair[1] - pair[0]).is_finite());
         if let Some(index) = values.windows(2).position(descends) {
-            let span = param.value_span(index + 1, report);
+            let span = param.value_span(index + 1, lookup.report);
             let message = format!("{knots:?} must not descend, found {}", values[index + 1]);
-            report.error(span, message);
-            return None;
+            return lookup.report.fail(span, message);
         }
         let limits = [values[order - 1], values[count]];
         let range = [
-            lookup.float_in(start, limits[0], limits, report),
-            lookup.float_in(end, limits[1], limits, report),
+            lookup.float_in(start, limits[0], limits),
+            lookup.float_in(end, limits[1], limits),
         ];
-        if report.error_count() > errors_before {
-            return None;
-        }
+        lookup.report.clean_since(errors_before)?;
         if range[0] == range[1] {
             let message = format!("{} has no surface: {start:?} equals {end:?}", lookup.what());
-            report.error(lookup.at, message);
-            return None;
+            return lookup.fail(message);
         }
         Some(Self {
             order,
@@ -128,50 +114,29 @@ impl Basis {
 }
 
 /// Reads the control points "P", or "Pw" with their weights. `None`: a mistake was reported.
-fn control_points(lookup: &mut Lookup, wanted: usize, report: &mut Report) -> Option<Vec<DVec4>> {
+fn control_points(lookup: &mut Lookup, wanted: usize) -> Option<Vec<DVec4>> {
     let plain = lookup.find("P", &[ParamType::Point3]);
-    let weighted = lookup.find("Pw", &[ParamType::Float]);
-    let (param, points): (&Param, Vec<DVec4>) = match (plain, weighted) {
+    let weighted = lookup.find("Pw", FLOAT);
+    let (param, size) = match (plain, weighted) {
         (Some(_), Some(_)) => {
-            report.error(lookup.at, "\"P\" and \"Pw\" are both given; remove one");
-            return None;
+            return lookup.fail("\"P\" and \"Pw\" are both given; remove one");
         }
         (None, None) => {
             if !lookup.has("Pw") {
-                lookup.report_missing("P", "point", report);
+                lookup.report_missing("P", "point");
             }
             return None;
         }
-        (Some(param), None) => match &param.values {
-            Values::Points(values) => {
-                let points = values.chunks_exact(3);
-                (
-                    param,
-                    points.map(|p| DVec3::from_slice(p).extend(1.0)).collect(),
-                )
-            }
-            _ => return None,
-        },
-        (None, Some(param)) => match &param.values {
-            Values::Floats(values) => {
-                if !values.len().is_multiple_of(4) {
-                    let message = format!("{} values of \"Pw\" do not make points", values.len());
-                    report.error_help(param.list, message, "a point has x, y, z and a weight");
-                    return None;
-                }
-                let points = values.chunks_exact(4);
-                let point = |p: &[f32]| DVec4::from([0, 1, 2, 3].map(|k| f64::from(p[k])));
-                (param, points.map(point).collect())
-            }
-            _ => return None,
-        },
+        (Some(param), None) => (param, 3),
+        (None, Some(param)) => (param, 4),
     };
-    let values: Vec<f64> = match &param.values {
-        Values::Points(values) => values.clone(),
-        Values::Floats(values) => values.iter().copied().map(f64::from).collect(),
-        _ => return None,
-    };
-    let is_weight = |index: usize| weighted.is_some() && index % 4 == 3;
+    let values = param.values.doubles()?;
+    if !values.len().is_multiple_of(size) {
+        let message = format!("{} values of \"Pw\" do not make points", values.len());
+        let help = "a point has x, y, z and a weight";
+        return lookup.report.fail_help(param.list, message, help);
+    }
+    let is_weight = |index: usize| size == 4 && index % 4 == 3;
     let is_wrong =
         |&index: &usize| !values[index].is_finite() || (is_weight(index) && values[index] < 0.0);
     if let Some(index) = (0..values.len()).find(is_wrong) {
@@ -180,30 +145,27 @@ fn control_points(lookup: &mut Lookup, wanted: usize, report: &mut Report) -> Op
             true => format!("a weight of {name:?} must not be negative, found {x}"),
             false => format!("{name:?} must be finite, found {x}"),
         };
-        let span = param.value_span(index, report);
-        report.error(span, message);
-        return None;
+        let span = param.value_span(index, lookup.report);
+        return lookup.report.fail(span, message);
     }
-    if points.len() != wanted {
-        let message = format!(
-            "found {} control points, but nu x nv is {wanted}",
-            points.len()
-        );
-        report.error(param.list, message);
-        return None;
+    let found = values.len() / size;
+    if found != wanted {
+        let message = format!("found {found} control points, but nu x nv is {wanted}");
+        return lookup.report.fail(param.list, message);
     }
-    Some(points)
+    let point = |p: &[f64]| DVec3::from_slice(p).extend(p.get(3).copied().unwrap_or(1.0));
+    Some(values.chunks_exact(size).map(point).collect())
 }
 
 /// Reads a `nurbs`. Texture coordinates are the parameters. `None`: a mistake was reported.
-pub(super) fn nurbs(lookup: &mut Lookup, report: &mut Report) -> Option<TriangleMesh> {
-    let bases = [U, V].map(|names| Basis::read(lookup, names, report));
+pub(super) fn nurbs(lookup: &mut Lookup) -> Option<TriangleMesh> {
+    let bases = [U, V].map(|names| Basis::read(lookup, names));
     let [Some(along_u), Some(along_v)] = bases else {
         lookup.ignore_all();
         return None;
     };
     let wanted = along_u.points * along_v.points;
-    let points = control_points(lookup, wanted, report)?;
+    let points = control_points(lookup, wanted)?;
     let cells = DICED - 1;
     let mut is_surface = true;
     let share = |index: u32| f64::from(index) / f64::from(cells);
@@ -228,9 +190,7 @@ pub(super) fn nurbs(lookup: &mut Lookup, report: &mut Report) -> Option<Triangle
         }
     }
     if !is_surface {
-        let message = "the weights of \"Pw\" add up to 0 somewhere on the surface";
-        report.error(lookup.at, message);
-        return None;
+        return lookup.fail("the weights of \"Pw\" add up to 0 somewhere on the surface");
     }
     let index = |share: f64| (share * f64::from(cells)).round() as usize;
     let mut mesh = grid::mesh([cells; 2], |u, v| {

@@ -8,8 +8,7 @@ use antumbra_scene::TriangleMesh;
 use glam::DVec3;
 
 use super::grid;
-use crate::lookup::Lookup;
-use crate::report::Report;
+use crate::lookup::{Lookup, NOT_NEGATIVE, POSITIVE};
 
 /// Number of segments of a whole turn.
 const SEGMENTS: u32 = 256;
@@ -42,34 +41,28 @@ impl Tessellation {
     }
 }
 
-pub(super) const POSITIVE: [f32; 2] = [f32::MIN_POSITIVE, f32::MAX];
-
-pub(super) fn radius(lookup: &mut Lookup, report: &mut Report) -> f64 {
-    lookup.float_in("radius", 1.0, POSITIVE, report).into()
+pub(super) fn radius(lookup: &mut Lookup) -> f64 {
+    lookup.float_in("radius", 1.0, POSITIVE).into()
 }
 
 /// Reads the sweep around the z axis in radians. `None`: the angle is 0, which was reported.
-pub(super) fn sweep(lookup: &mut Lookup, report: &mut Report) -> Option<f64> {
-    let degrees = lookup.float("phimax", 360.0, report).clamp(0.0, 360.0);
+pub(super) fn sweep(lookup: &mut Lookup) -> Option<f64> {
+    let degrees = lookup.float("phimax", 360.0).clamp(0.0, 360.0);
     if degrees == 0.0 {
-        report_empty(lookup, report);
-        return None;
+        return empty(lookup);
     }
     Some(f64::from(degrees).to_radians())
 }
 
 /// Heights of both ends, the lower one first. The default of the upper one is 1.
-pub(super) fn heights(lookup: &mut Lookup, low: f32, report: &mut Report) -> [f64; 2] {
-    let ends = [
-        lookup.float("zmin", low, report),
-        lookup.float("zmax", 1.0, report),
-    ];
+pub(super) fn heights(lookup: &mut Lookup, low: f32) -> [f64; 2] {
+    let ends = [lookup.float("zmin", low), lookup.float("zmax", 1.0)];
     [ends[0].min(ends[1]), ends[0].max(ends[1])].map(f64::from)
 }
 
-pub(super) fn report_empty(lookup: &Lookup, report: &mut Report) {
-    let message = format!("{} has no surface", lookup.what());
-    report.error(lookup.at, message);
+/// Reports that a shape has no surface.
+pub(super) fn empty<T>(lookup: &mut Lookup) -> Option<T> {
+    lookup.fail(format!("{} has no surface", lookup.what()))
 }
 
 /// Point of the unit circle around the z axis.
@@ -79,20 +72,13 @@ fn around(angle: f64) -> DVec3 {
 }
 
 /// Reads a `disk`, perpendicular to z. `None`: a mistake was reported.
-pub(super) fn disk(
-    lookup: &mut Lookup,
-    tessellation: Tessellation,
-    report: &mut Report,
-) -> Option<TriangleMesh> {
-    let height: f64 = lookup.float("height", 0.0, report).into();
-    let outer = radius(lookup, report);
-    let inner: f64 = lookup
-        .float_in("innerradius", 0.0, [0.0, f32::MAX], report)
-        .into();
-    let sweep = sweep(lookup, report)?;
+pub(super) fn disk(lookup: &mut Lookup, tessellation: Tessellation) -> Option<TriangleMesh> {
+    let height: f64 = lookup.float("height", 0.0).into();
+    let outer = radius(lookup);
+    let inner: f64 = lookup.float_in("innerradius", 0.0, NOT_NEGATIVE).into();
+    let sweep = sweep(lookup)?;
     if inner >= outer {
-        report_empty(lookup, report);
-        return None;
+        return empty(lookup);
     }
     let size = [tessellation.segments(sweep), 1];
     let make = |scale: f64| {
@@ -107,17 +93,12 @@ pub(super) fn disk(
 }
 
 /// Reads a `cylinder` around z, without caps. `None`: a mistake was reported.
-pub(super) fn cylinder(
-    lookup: &mut Lookup,
-    tessellation: Tessellation,
-    report: &mut Report,
-) -> Option<TriangleMesh> {
-    let radius = radius(lookup, report);
-    let [low, high] = heights(lookup, -1.0, report);
-    let sweep = sweep(lookup, report)?;
+pub(super) fn cylinder(lookup: &mut Lookup, tessellation: Tessellation) -> Option<TriangleMesh> {
+    let radius = radius(lookup);
+    let [low, high] = heights(lookup, -1.0);
+    let sweep = sweep(lookup)?;
     if low == high {
-        report_empty(lookup, report);
-        return None;
+        return empty(lookup);
     }
     let size = [tessellation.segments(sweep), 1];
     let make = |scale: f64| {
@@ -145,21 +126,20 @@ pub(super) struct SpherePart {
 
 impl SpherePart {
     /// Reads the parameters of a `sphere`. `None`: a mistake was reported.
-    pub fn read(lookup: &mut Lookup, report: &mut Report) -> Option<Self> {
-        let radius = radius(lookup, report);
+    pub fn read(lookup: &mut Lookup) -> Option<Self> {
+        let radius = radius(lookup);
         let ends = [
-            lookup.float("zmin", -radius as f32, report),
-            lookup.float("zmax", radius as f32, report),
+            lookup.float("zmin", -radius as f32),
+            lookup.float("zmax", radius as f32),
         ];
         let part = Self {
             radius,
             low: f64::from(ends[0].min(ends[1])).clamp(-radius, radius),
             high: f64::from(ends[0].max(ends[1])).clamp(-radius, radius),
-            sweep: sweep(lookup, report)?,
+            sweep: sweep(lookup)?,
         };
         if part.low == part.high {
-            report_empty(lookup, report);
-            return None;
+            return empty(lookup);
         }
         Some(part)
     }

@@ -6,9 +6,8 @@ use antumbra_scene::TriangleMesh;
 use glam::{DMat3, DVec3};
 
 use super::grid;
-use super::quadric::{POSITIVE, Tessellation, heights, radius, report_empty, sweep};
-use crate::lookup::Lookup;
-use crate::report::Report;
+use super::quadric::{Tessellation, empty, heights, radius, sweep};
+use crate::lookup::{Lookup, POSITIVE};
 
 /// Circle of a surface of revolution, or the part of one that is swept.
 struct Ring {
@@ -60,14 +59,10 @@ fn revolve(
 }
 
 /// Reads a `cone` around z, without its base. `None`: a mistake was reported.
-pub(super) fn cone(
-    lookup: &mut Lookup,
-    tessellation: Tessellation,
-    report: &mut Report,
-) -> Option<TriangleMesh> {
-    let radius = radius(lookup, report);
-    let height = f64::from(lookup.float_in("height", 1.0, POSITIVE, report));
-    let sweep = sweep(lookup, report)?;
+pub(super) fn cone(lookup: &mut Lookup, tessellation: Tessellation) -> Option<TriangleMesh> {
+    let radius = radius(lookup);
+    let height = f64::from(lookup.float_in("height", 1.0, POSITIVE));
+    let sweep = sweep(lookup)?;
     Some(revolve(tessellation, 1, sweep, |v| Ring {
         start: DVec3::new(radius * (1.0 - v), 0.0, v * height),
         normal: DVec3::new(height, 0.0, radius),
@@ -76,17 +71,12 @@ pub(super) fn cone(
 }
 
 /// Reads a `paraboloid` around z, with its vertex in the origin. `None`: a mistake was reported.
-pub(super) fn paraboloid(
-    lookup: &mut Lookup,
-    tessellation: Tessellation,
-    report: &mut Report,
-) -> Option<TriangleMesh> {
-    let radius = radius(lookup, report);
-    let [low, high] = heights(lookup, 0.0, report);
-    let sweep = sweep(lookup, report)?;
+pub(super) fn paraboloid(lookup: &mut Lookup, tessellation: Tessellation) -> Option<TriangleMesh> {
+    let radius = radius(lookup);
+    let [low, high] = heights(lookup, 0.0);
+    let sweep = sweep(lookup)?;
     if low == high || high == 0.0 {
-        report_empty(lookup, report);
-        return None;
+        return empty(lookup);
     }
     // There is no surface on the other side of the vertex.
     let start = if high > 0.0 { low.max(0.0) } else { low };
@@ -106,38 +96,28 @@ pub(super) fn paraboloid(
 /// Reads a `hyperboloid` around z, made by a line between two points. `None`: a mistake was reported.
 ///
 /// As in pbrt-v3, the surface is symmetric about z = 0. The line is on it only where that holds for the line, too.
-pub(super) fn hyperboloid(
-    lookup: &mut Lookup,
-    tessellation: Tessellation,
-    report: &mut Report,
-) -> Option<TriangleMesh> {
-    let mut from = lookup.point("p1", DVec3::ZERO, report);
-    let mut to = lookup.point("p2", DVec3::ONE, report);
-    let sweep = sweep(lookup, report)?;
+pub(super) fn hyperboloid(lookup: &mut Lookup, tessellation: Tessellation) -> Option<TriangleMesh> {
+    let mut from = lookup.point("p1", DVec3::ZERO);
+    let mut to = lookup.point("p2", DVec3::ONE);
+    let sweep = sweep(lookup)?;
     if to.z == 0.0 {
         std::mem::swap(&mut from, &mut to);
     }
     let along = to - from;
     if along.z == 0.0 || (along.truncate() == from.truncate() && from.x == 0.0 && from.y == 0.0) {
-        report_empty(lookup, report);
-        return None;
+        return empty(lookup);
     }
     let squared = squared_radius(from, to);
     let flat = along.truncate();
     let crossing = -from.truncate().dot(flat) / flat.length_squared();
     let misses_axis = (from.truncate() + flat * crossing).length() > 1e-9 * flat.length();
     if crossing > 0.0 && crossing < 1.0 && !misses_axis {
-        report.unsupported(
-            lookup.at,
-            "a hyperboloid whose line crosses the axis between its ends is",
-        );
-        return None;
+        return lookup.refuse("a hyperboloid whose line crosses the axis between its ends is");
     }
     let heights = (0..=PIECES).map(|piece| from.z + along.z * f64::from(piece) / f64::from(PIECES));
     let least = heights.map(&squared).fold(f64::INFINITY, f64::min);
     if least < -1e-9 * (from.length_squared() + to.length_squared()) {
-        report.unsupported(lookup.at, "a hyperboloid with gaps between its ends is");
-        return None;
+        return lookup.refuse("a hyperboloid with gaps between its ends is");
     }
     Some(revolve(tessellation, tessellation.rows(), sweep, |v| {
         let on_line = from + along * v;

@@ -7,24 +7,20 @@ use glam::{DMat4, Vec3};
 
 use super::quadric::{SpherePart, Tessellation};
 use crate::lookup::Lookup;
-use crate::report::Report;
 
 /// Reads the geometry of a `sphere`. `None`: a mistake was reported.
 pub(super) fn sphere(
     lookup: &mut Lookup,
     to_world: &DMat4,
     tessellation: Tessellation,
-    report: &mut Report,
 ) -> Option<Geometry> {
-    let part = SpherePart::read(lookup, report)?;
+    let part = SpherePart::read(lookup)?;
     let whole = Sphere::new(Vec3::ZERO, part.radius as f32);
     match whole.transformed(to_world).filter(|_| part.is_whole()) {
         Some(sphere) => {
             let is_finite = sphere.center.is_finite() && sphere.radius.is_finite();
             if !(is_finite && sphere.radius > 0.0) {
-                let message = "the sphere is beyond the range of 32-bit floats";
-                report.error(lookup.at, message);
-                return None;
+                return lookup.fail("the sphere is beyond the range of 32-bit floats");
             }
             Some(Geometry::Sphere(sphere))
         }

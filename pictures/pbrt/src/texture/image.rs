@@ -11,7 +11,6 @@ use rayon::prelude::*;
 
 use crate::lookup::Lookup;
 use crate::params::{ParamType, Params, Values};
-use crate::report::Report;
 
 /// Bytes per pixel for the coarser levels of an image, which the renderer makes, and for making them.
 const COARSER_LEVELS: u64 = 5;
@@ -67,14 +66,9 @@ impl Images {
     }
 
     /// Image that a string parameter names. `None`: a mistake was reported.
-    pub fn of(
-        &mut self,
-        lookup: &mut Lookup,
-        param: &'static str,
-        report: &mut Report,
-    ) -> Option<Arc<Image>> {
-        let (name, span) = lookup.needed_string(param, report)?;
-        let folder = report.sources.folder.clone();
+    pub fn of(&mut self, lookup: &mut Lookup, param: &'static str) -> Option<Arc<Image>> {
+        let (name, span) = lookup.needed_string(param)?;
+        let folder = lookup.report.sources.folder.clone();
         self.read_ahead(&folder, &[name], &Allowance::new(self.allowed));
         let id = identity(folder.join(name));
         let image = self.by_path.get(&id)?;
@@ -88,10 +82,7 @@ impl Images {
             }
             Err(Problem { message, help }) => {
                 let message = format!("cannot read image {name:?}: {message}");
-                match help {
-                    Some(help) => report.error_help(span, message, help),
-                    None => report.error(span, message),
-                }
+                lookup.report.add_error(span, message, help.clone());
                 None
             }
         }

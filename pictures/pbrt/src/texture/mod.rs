@@ -9,7 +9,7 @@
 mod image;
 mod mapping;
 
-use std::ops::{Add, Mul};
+use std::ops::{Add, Deref, DerefMut, Mul};
 use std::sync::Arc;
 
 use antumbra_scene::{
@@ -133,36 +133,47 @@ impl Value for Rgb {
 }
 
 /// Lookups of parameters that may name textures.
-pub(crate) struct Textured<'a, 'p> {
-    pub lookup: &'a mut Lookup<'p>,
+pub(crate) struct Textured<'a> {
+    pub lookup: Lookup<'a>,
     pub state: &'a State,
-    pub report: &'a mut Report,
 }
 
-impl Textured<'_, '_> {
+impl<'a> Deref for Textured<'a> {
+    type Target = Lookup<'a>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.lookup
+    }
+}
+
+impl DerefMut for Textured<'_> {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.lookup
+    }
+}
+
+impl Textured<'_> {
     /// Finds a parameter with the place of its value. `None`: it is not given, or a mistake was reported.
-    pub fn find<T: Value>(&mut self, name: &'static str) -> Option<(Param<T>, Span)> {
-        let param = self.lookup.find(name, T::TYPES_OR_TEXTURE)?;
-        let value = if param.param_type == ParamType::Texture {
-            self.resolve(param)?
-        } else {
-            Param::Constant(T::read(param, self.report)?)
+    pub fn textured<T: Value>(&mut self, name: &'static str) -> Option<(Param<T>, Span)> {
+        let param = self.find(name, T::TYPES_OR_TEXTURE)?;
+        let value = match param.param_type {
+            ParamType::Texture => self.resolve(param)?,
+            _ => Param::Constant(T::read(param, self.report)?),
         };
         Some((value, param.value))
     }
 
     /// Parameter, or the default.
     pub fn param<T: Value>(&mut self, name: &'static str, default: f32) -> Param<T> {
-        self.find(name)
-            .map_or(Param::Constant(T::splat(default)), |(value, _)| value)
+        let found = self.textured(name);
+        found.map_or(Param::Constant(T::splat(default)), |(value, _)| value)
     }
 
     /// Parameter that cannot be a texture, or the default.
     fn constant<T: Value>(&mut self, name: &'static str, default: f32) -> T {
-        self.lookup
-            .find(name, T::TYPES)
-            .and_then(|param| T::read(param, self.report))
-            .unwrap_or(T::splat(default))
+        let found = self.find(name, T::TYPES);
+        let value = found.and_then(|param| T::read(param, self.report));
+        value.unwrap_or(T::splat(default))
     }
 
     /// Finds the texture that a parameter names. `None`: it is unknown or unsupported, which was reported.
@@ -171,22 +182,15 @@ impl Textured<'_, '_> {
         let textures = T::textures(self.state);
         match textures.get(name) {
             Some(Definition::Known(value)) => Some(value.clone()),
-            Some(Definition::Unsupported(class)) => {
-                let feature = format!("textures of class {class:?} are");
-                self.report.unsupported(param.value, feature);
-                None
+            Some(Definition::Unsupported(class)) => self
+                .report
+                .refuse(param.value, format!("textures of class {class:?} are")),
+            None if !self.report.is_counted_only() => {
+                let message = format!("no {} texture is named {name:?} here", T::NAME);
+                let help = suggest::help(name, &textures.names());
+                self.report.fail_help(param.value, message, help)
             }
-            Some(Definition::Broken) => None,
-            None => {
-                if !self.report.is_counted_only() {
-                    self.report.error_help(
-                        param.value,
-                        format!("no {} texture is named {name:?} here", T::NAME),
-                        suggest::help(name, &textures.names()),
-                    );
-                }
-                None
-            }
+            Some(Definition::Broken) | None => None,
         }
     }
 }
@@ -239,14 +243,14 @@ pub(crate) fn define(
     images: &mut Images,
     report: &mut Report,
 ) {
-    match declaration.value_type.text.as_str() {
+    let Quoted { text, span } = &declaration.value_type;
+    match text.as_str() {
         "float" => define_as::<f32>(state, declaration, images, report),
         "color" | "spectrum" => define_as::<Rgb>(state, declaration, images, report),
-        unknown => report.error_help(
-            declaration.value_type.span,
-            format!("unknown texture type {unknown:?}"),
-            "known: float, color, spectrum",
-        ),
+        unknown => {
+            let message = format!("unknown texture type {unknown:?}");
+            report.error_help(*span, message, "known: float, color, spectrum");
+        }
     }
 }
 
@@ -256,123 +260,126 @@ fn define_as<T: Value>(
     images: &mut Images,
     report: &mut Report,
 ) {
-    let Declaration { at, class, .. } = &declaration;
-    let what = format!("texture {:?}", class.text);
-    let mut lookup = Lookup::new(*at, what, &declaration.params);
+    let Declaration {
+        at, class, params, ..
+    } = &declaration;
     let mut values = Textured {
-        lookup: &mut lookup,
+        lookup: Lookup::new("texture", *at, class, params, report),
         state,
-        report,
     };
-    let definition = build::<T>(&declaration, &mut values, images);
-    lookup.finish(report);
+    let definition = match class.text.as_str() {
+        "constant" => Definition::Known(Param::Constant(values.constant::<T>("value", 1.0))),
+        class => match refused::<T>(class, &values) {
+            Some(refused) => {
+                values.ignore_all();
+                Definition::Unsupported(refused)
+            }
+            None => match build(&mut values, &declaration.space, images) {
+                Some(value) => Definition::Known(value),
+                None => Definition::Broken,
+            },
+        },
+    };
+    values.lookup.finish();
     T::textures_mut(state).define(declaration.name.text, definition);
 }
 
+/// Name for a class of textures that is known but not supported.
+fn refused<T: Value>(class: &str, values: &Textured) -> Option<String> {
+    match class {
+        // pbrt-v3 has none of numbers, and says so where one is used.
+        "marble" | "uv" if T::NAME == f32::NAME => Some(format!("{class} of numbers")),
+        "directionmix" if values.is_version4() => Some(class.to_owned()),
+        _ => UNSUPPORTED.contains(&class).then(|| class.to_owned()),
+    }
+}
+
+/// Reads a texture of a supported class, or a value where its parts are values. `None`: a mistake was reported.
 fn build<T: Value>(
-    declaration: &Declaration,
     values: &mut Textured,
+    space: &TextureSpace,
     images: &mut Images,
-) -> Definition<T> {
-    let class = &declaration.class;
-    let space = &declaration.space;
-    let texture = match class.text.as_str() {
-        "constant" => return Definition::Known(Param::Constant(values.constant("value", 1.0))),
+) -> Option<Param<T>> {
+    let texture = match values.kind.text.as_str() {
         "scale" => {
             let factors = [values.param("tex1", 1.0), values.param("tex2", 1.0)];
             if let [Param::Constant(a), Param::Constant(b)] = factors {
-                return Definition::Known(Param::Constant(a * b));
+                return Some(Param::Constant(a * b));
             }
-            Some(Texture::Scale(factors))
+            Texture::Scale(factors)
         }
         "mix" => {
             let ends = [values.param("tex1", 0.0), values.param("tex2", 1.0)];
             let amount = values.param("amount", 0.5);
             if let ([Param::Constant(a), Param::Constant(b)], Param::Constant(t)) = (&ends, &amount)
             {
-                return Definition::Known(Param::Constant(*a * (1.0 - t) + *b * *t));
+                return Some(Param::Constant(*a * (1.0 - t) + *b * *t));
             }
-            Some(Texture::Mix { ends, amount })
+            Texture::Mix { ends, amount }
         }
-        "checkerboard" => checkerboard(values, space),
-        "directionmix" if values.report.is_version4 => {
-            values.lookup.ignore_all();
-            return Definition::Unsupported("directionmix".into());
-        }
+        "checkerboard" => checkerboard(values, space)?,
         "bilerp" => {
             let corners = [("v00", 0.0), ("v01", 1.0), ("v10", 0.0), ("v11", 1.0)];
-            let corners = corners.map(|(name, default)| values.constant(name, default));
-            let mapping = mapping::read(values.lookup, space, values.report);
-            mapping.map(|mapping| Texture::Bilerp { corners, mapping })
-        }
-        "dots" => {
-            // pbrt-v3 passes the two in the other order than it takes them.
-            let dots = [values.param("inside", 1.0), values.param("outside", 0.0)];
-            let mapping = mapping::read(values.lookup, space, values.report);
-            mapping.map(|mapping| Texture::Dots { dots, mapping })
-        }
-        // pbrt-v3 has none of numbers, and says so where one is used.
-        name @ ("marble" | "uv") if T::NAME == f32::NAME => {
-            values.lookup.ignore_all();
-            return Definition::Unsupported(format!("{name} of numbers"));
-        }
-        "fbm" | "marble" | "windy" | "wrinkled" => Some(Texture::Noise {
-            pattern: pattern(&class.text, values),
-            texture_from_world: space.of_noise(values.report),
-        }),
-        "uv" => mapping::read(values.lookup, space, values.report).map(Texture::Uv),
-        "imagemap" => image_texture(values, space, images),
-        name => {
-            values.lookup.ignore_all();
-            if UNSUPPORTED.contains(&name) {
-                return Definition::Unsupported(name.to_owned());
+            Texture::Bilerp {
+                corners: corners.map(|(name, default)| values.constant(name, default)),
+                mapping: mapping::read(values, space)?,
             }
+        }
+        // pbrt-v3 passes the two in the other order than it takes them.
+        "dots" => Texture::Dots {
+            dots: [values.param("inside", 1.0), values.param("outside", 0.0)],
+            mapping: mapping::read(values, space)?,
+        },
+        "fbm" | "marble" | "windy" | "wrinkled" => Texture::Noise {
+            pattern: pattern(values),
+            texture_from_world: space.of_noise(values.report),
+        },
+        "uv" => Texture::Uv(mapping::read(values, space)?),
+        "imagemap" => image_texture(values, space, images)?,
+        name => {
+            values.ignore_all();
+            let span = values.kind.span;
             values
                 .report
-                .unknown(class.span, "texture class", name, SUPPORTED);
-            None
+                .unknown(span, "texture class", name, SUPPORTED);
+            return None;
         }
     };
-    match texture {
-        Some(texture) if !parts::texture_fits(&texture) => {
-            let most = parts::MAX_PARTS;
-            let message = format!("a texture is made of more than {most} others");
-            values.report.error_once(declaration.at, message, None);
-            Definition::Broken
-        }
-        Some(texture) => Definition::Known(Param::Texture(Arc::new(texture))),
-        None => Definition::Broken,
+    if !parts::texture_fits(&texture) {
+        let most = parts::MAX_PARTS;
+        let message = format!("a texture is made of more than {most} others");
+        let at = values.at;
+        values.report.error_once(at, message, None);
+        return None;
     }
+    Some(Param::Texture(Arc::new(texture)))
 }
 
 fn checkerboard<T: Value>(values: &mut Textured, space: &TextureSpace) -> Option<Texture<T>> {
     let squares = [values.param("tex1", 1.0), values.param("tex2", 0.0)];
-    let Textured { lookup, report, .. } = values;
-    let dimension = lookup.integer_from("dimension", 2, 2, report);
+    let dimension = values.integer_from("dimension", 2, 2);
     if dimension == 3 {
         return Some(Texture::Checkerboard3 {
             cubes: squares,
-            texture_from_world: space.of_noise(report),
+            texture_from_world: space.of_noise(values.report),
         });
     }
     if dimension > 3 {
-        let message = format!("a checkerboard has 2 or 3 dimensions, found {dimension}");
-        report.error(lookup.at, message);
-        return None;
+        return values.fail(format!(
+            "a checkerboard has 2 or 3 dimensions, found {dimension}"
+        ));
     }
     let modes = [("closedform", true), ("none", false)];
-    let smooth = lookup.choice("aamode", modes, report);
-    let mapping = mapping::read(lookup, space, report)?;
     Some(Texture::Checkerboard {
         squares,
-        mapping,
-        smooth,
+        smooth: values.choice("aamode", modes),
+        mapping: mapping::read(values, space)?,
     })
 }
 
-/// Pattern of noise of a class.
-fn pattern(class: &str, values: &mut Textured) -> NoisePattern {
-    match class {
+/// Pattern of a class of noise.
+fn pattern(values: &mut Textured) -> NoisePattern {
+    match values.kind.text.as_str() {
         "fbm" => NoisePattern::Fbm(octaves(values)),
         "wrinkled" => NoisePattern::Wrinkled(octaves(values)),
         "marble" => NoisePattern::Marble {
@@ -384,11 +391,10 @@ fn pattern(class: &str, values: &mut Textured) -> NoisePattern {
     }
 }
 
-fn octaves(values: &mut Textured) -> Octaves {
-    let Textured { lookup, report, .. } = values;
+fn octaves(values: &mut Lookup) -> Octaves {
     Octaves {
-        count: lookup.integer_in("octaves", 8, [0, MAX_OCTAVES], report),
-        roughness: lookup.float("roughness", 0.5, report),
+        count: values.integer_in("octaves", 8, [0, MAX_OCTAVES]),
+        roughness: values.float("roughness", 0.5),
     }
 }
 
@@ -399,42 +405,37 @@ fn image_texture<T: Value>(
     images: &mut Images,
 ) -> Option<Texture<T>> {
     let texture = image_map(values, space, images).map(Texture::Image);
-    let Textured { lookup, report, .. } = values;
-    if !report.is_version4 || !lookup.bool("invert", false, report) {
+    if !values.is_version4() || !values.bool("invert", false) {
         return texture;
     }
-    let inverted = texture.map(T::inverted);
-    if inverted.as_ref().is_some_and(Option::is_none) {
-        report.unsupported(lookup.at, "\"invert\" of an image of colours is");
+    match T::inverted(texture?) {
+        None => values.refuse("\"invert\" of an image of colours is"),
+        inverted => inverted,
     }
-    inverted.flatten()
 }
 
 fn image_map(
-    values: &mut Textured,
+    lookup: &mut Lookup,
     space: &TextureSpace,
     images: &mut Images,
 ) -> Option<ImageTexture> {
-    let Textured { lookup, report, .. } = values;
-    let image = images.of(lookup, "filename", report);
-    let mapping = mapping::read(lookup, space, report);
+    let image = images.of(lookup, "filename");
+    let mapping = mapping::read(lookup, space);
     let wraps = [
         ("repeat", Wrap::Repeat),
         ("black", Wrap::Black),
         ("clamp", Wrap::Clamp),
     ];
-    let wrap = lookup.choice("wrap", wraps, report);
-    let max_anisotropy = lookup.float_in("maxanisotropy", 8.0, [1.0, f32::MAX], report);
-    let filter = if lookup.bool("trilinear", false, report) {
+    let wrap = lookup.choice("wrap", wraps);
+    let max_anisotropy = lookup.float_in("maxanisotropy", 8.0, [1.0, f32::MAX]);
+    let filter = if lookup.bool("trilinear", false) {
         TextureFilter::Trilinear
     } else {
         TextureFilter::Ewa { max_anisotropy }
     };
-    let scale = lookup.float("scale", 1.0, report);
-    let is_encoded = image
-        .as_ref()
-        .is_some_and(|image| image::is_encoded(&image.name));
-    let gamma = lookup.bool("gamma", is_encoded, report);
+    let scale = lookup.float("scale", 1.0);
+    let is_encoded = (image.as_ref()).is_some_and(|image| image::is_encoded(&image.name));
+    let gamma = lookup.bool("gamma", is_encoded);
     Some(ImageTexture {
         image: image?,
         mapping: mapping?,

@@ -261,8 +261,10 @@ fn integrator(kind: &mut Quoted, params: &mut Params, report: &mut Report) {
         _ => return,
     };
     if kind.text == "lightpath" {
-        let message = "integrator \"lightpath\" is taken as \"volpath\"";
-        report.note(kind.span, message);
+        report.note(
+            kind.span,
+            "integrator \"lightpath\" is taken as \"volpath\"",
+        );
     }
     kind.text = name.into();
     for noise in [
@@ -274,8 +276,10 @@ fn integrator(kind: &mut Quoted, params: &mut Params, report: &mut Report) {
         params.drop(noise);
     }
     if params.bool("regularize") == Some(true) {
-        let message = "\"regularize\" is left out: nothing is made rougher against noise";
-        report.note(kind.span, message);
+        report.note(
+            kind.span,
+            "\"regularize\" is left out: nothing is made rougher against noise",
+        );
     }
     params.drop("regularize");
 }
