@@ -66,7 +66,7 @@ mod spectrum;
 mod state;
 mod suggest;
 #[cfg(test)]
-mod support;
+mod support_tests;
 mod texture;
 mod transform;
 mod version4;

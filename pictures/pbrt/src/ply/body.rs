@@ -1,98 +1,57 @@
-//! Body of a PLY file: the values.
-//!
-//! The reader of elements is generic over the source of single values: words of an ASCII file, or bytes in either
-//! order.
+//! Body of a PLY file: its vertices and faces, from any source of single values.
 
 use antumbra_scene::{TriangleMesh, polygon};
 use glam::{DVec3, Vec2};
 
 use super::header::{Element, Format, Header, Kind, Scalar};
-use super::{Fault, PlyPlace};
+use super::values::{Ascii, Binary, Problem, Values};
+use super::{Fault, Wanted};
 use crate::params::shorten;
 
-/// Source of single values.
-trait Values {
-    /// Next value. Every integer type of PLY is exact in an `f64`.
-    fn next(&mut self, scalar: Scalar) -> Result<f64, Problem>;
-    /// Skips values.
-    fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), Problem>;
-    /// Place of the last value read.
-    fn place(&self) -> PlyPlace;
-    /// Number of bytes that are not read yet.
-    fn remaining(&self) -> u64;
-    /// Notes that one of the items called `what` is complete.
-    fn end_item(&mut self, _what: &'static str) {}
-}
-
-/// Reason why there is no next value. The type is small, because every value is returned with it.
-enum Problem {
-    End,
-    NotANumber,
-}
-
-/// Reads the mesh, seen from `origin`, with colours of the vertices if they are wanted and there. Also returns how many faces
+/// Reads the mesh, seen from an origin, with colours of the vertices if they are wanted and there. Also returns how many faces
 /// have fewer than three corners.
 pub(super) fn parse(
     bytes: &[u8],
     header: &Header,
     most_triangles: u64,
-    wants_colors: bool,
-    origin: DVec3,
+    wanted: &Wanted,
 ) -> Result<(TriangleMesh, u64), Fault> {
-    let wanted = Wanted {
-        most_triangles,
-        wants_colors,
-        origin,
-    };
     let at = header.body;
     match header.format {
         Format::Ascii => {
-            let mut values = Ascii {
-                bytes: &bytes[at..],
-                at: 0,
-                word: 0..0,
-                line: header.body_line,
-                words: 0,
-                crowded: None,
-            };
-            let read = read(&mut values, header, &wanted);
+            let mut values = Ascii::new(&bytes[at..], header.body_line);
+            let read = read(&mut values, header, most_triangles, wanted);
             values.judge(read)
         }
         Format::LittleEndian => {
-            let last = at;
-            read(&mut Binary::<false> { bytes, at, last }, header, &wanted)
+            let mut values = Binary::<false>::new(bytes, at);
+            read(&mut values, header, most_triangles, wanted)
         }
         Format::BigEndian => {
-            let last = at;
-            read(&mut Binary::<true> { bytes, at, last }, header, &wanted)
+            let mut values = Binary::<true>::new(bytes, at);
+            read(&mut values, header, most_triangles, wanted)
         }
     }
-}
-
-/// What a caller wants of a mesh.
-struct Wanted {
-    most_triangles: u64,
-    wants_colors: bool,
-    origin: DVec3,
 }
 
 fn read(
     values: &mut impl Values,
     header: &Header,
+    most_triangles: u64,
     wanted: &Wanted,
 ) -> Result<(TriangleMesh, u64), Fault> {
     let required = |name: &str| match header.element(name) {
         Some(element) if element.count > 0 => Ok(element),
-        Some(element) => Err(Fault::new(
-            PlyPlace::Line(element.line),
-            format!("the file has no {name} (element {name} 0)"),
-        )),
-        None => Err(Fault::new(
-            PlyPlace::Line(header.body_line - 1),
-            format!("the header declares no element {name}"),
-        )),
+        Some(element) => {
+            let message = format!("the file has no {name} (element {name} 0)");
+            Err(Fault::at_line(element.line, message))
+        }
+        None => {
+            let message = format!("the header declares no element {name}");
+            Err(Fault::at_line(header.body_line - 1, message))
+        }
     };
-    let vertices = Vertices::new(required("vertex")?, wanted.wants_colors)?;
+    let vertices = Vertices::new(required("vertex")?, wanted.colors)?;
     let has_strips = |element: &&Element| element.name == STRIPS && element.count > 0;
     if !header.elements.iter().any(|element| has_strips(&element)) {
         required("face")?;
@@ -100,7 +59,7 @@ fn read(
     let mut mesh = TriangleMesh::default();
     let mut faces = Faces {
         vertex_count: vertices.element.count,
-        most_triangles: wanted.most_triangles.min(u32::MAX.into()),
+        most_triangles: most_triangles.min(u32::MAX.into()),
         corners: Vec::new(),
         unsplit: Vec::new(),
         flat: 0,
@@ -137,11 +96,9 @@ fn check_size(element: &Element, format: Format, remaining: u64) -> Result<(), F
     }
     let Element { name, count, .. } = element;
     let name = shorten(name);
-    Err(Fault::new(
-        PlyPlace::Line(element.line),
-        format!("element {name} declares {count}, which {remaining} bytes cannot hold"),
-    )
-    .help("the file is cut short, or its header is wrong"))
+    let message = format!("element {name} declares {count}, which {remaining} bytes cannot hold");
+    let help = "the file is cut short, or its header is wrong";
+    Err(Fault::at_line(element.line, message).help(help))
 }
 
 /// Makes the mistake for a missing or wrong value of item `index` of `what`.
@@ -215,7 +172,7 @@ struct Vertices<'a> {
 
 impl<'a> Vertices<'a> {
     fn new(element: &'a Element, wants_colors: bool) -> Result<Self, Fault> {
-        let place = PlyPlace::Line(element.line);
+        let mistake = |message| Err(Fault::at_line(element.line, message));
         let mut slots = vec![None; element.properties.len()];
         // The names count only if all of them exist as scalars.
         let mut assign = |names: &[&str], first: usize| {
@@ -232,10 +189,7 @@ impl<'a> Vertices<'a> {
             found.is_some()
         };
         if !assign(&["x", "y", "z"], 0) {
-            return Err(Fault::new(
-                place,
-                "element vertex has no properties x, y and z",
-            ));
+            return mistake("element vertex has no properties x, y and z");
         }
         let has_normals = assign(&["nx", "ny", "nz"], 3);
         // Names that pbrt-v3 looks for, in its order.
@@ -264,7 +218,7 @@ impl<'a> Vertices<'a> {
             }
         });
         if element.count > u64::from(u32::MAX) {
-            return Err(Fault::new(place, "more vertices than 32 bits can count"));
+            return mistake("more vertices than 32 bits can count");
         }
         Ok(Self {
             element,
@@ -355,7 +309,7 @@ impl Faces {
         let Element { name, line, .. } = element;
         let Some(list) = list else {
             let message = format!("element {name} has no list vertex_indices");
-            return Err(Fault::new(PlyPlace::Line(*line), message));
+            return Err(Fault::at_line(*line, message));
         };
         let strips = name == STRIPS;
         let what = if strips { "strip" } else { "face" };
@@ -435,173 +389,16 @@ impl Faces {
     #[cold]
     fn too_many(&self, values: &impl Values) -> Fault {
         let most = self.most_triangles;
-        Fault::new(
-            values.place(),
-            format!("the mesh has more triangles than the {most} for which memory is allowed"),
-        )
+        let message =
+            format!("the mesh has more triangles than the {most} for which memory is allowed");
+        Fault::new(values.place(), message)
     }
 
     #[cold]
     fn bad_index(&self, values: &impl Values, what: &str, index: u64, vertex: f64) -> Fault {
         let count = self.vertex_count;
-        Fault::new(
-            values.place(),
-            format!("{what} {index}: vertex index {vertex} is not one of the {count} vertices"),
-        )
-        .help(format!("indices are 0 to {}", count - 1))
-    }
-}
-
-/// Source of values in ASCII files.
-struct Ascii<'a> {
-    bytes: &'a [u8],
-    at: usize,
-    /// Range of the last word read.
-    word: std::ops::Range<usize>,
-    line: u64,
-    /// Number of words of the current item.
-    words: u64,
-    /// First line on which something follows an item, with the words on it, the words of the item, and its name.
-    crowded: Option<(u64, u64, u64, &'static str)>,
-}
-
-impl Ascii<'_> {
-    fn next_word(&mut self) -> Result<(), Problem> {
-        while let Some(byte) = self.bytes.get(self.at) {
-            match byte {
-                b'\n' => self.line += 1,
-                b'\r' if self.bytes.get(self.at + 1) != Some(&b'\n') => self.line += 1,
-                byte if byte.is_ascii_whitespace() => {}
-                _ => break,
-            }
-            self.at += 1;
-        }
-        let rest = &self.bytes[self.at..];
-        let length = rest.iter().position(u8::is_ascii_whitespace);
-        let length = length.unwrap_or(rest.len());
-        self.word = self.at..self.at + length;
-        self.at += length;
-        self.words += 1;
-        if length == 0 {
-            return Err(Problem::End);
-        }
-        Ok(())
-    }
-
-    /// The mesh, unless a line has more values than its item and the values do not end with the file. Then items are cut
-    /// at the wrong places. A file that has all its values on one line is as good as others.
-    fn judge(
-        mut self,
-        read: Result<(TriangleMesh, u64), Fault>,
-    ) -> Result<(TriangleMesh, u64), Fault> {
-        let Some((line, found, declared, what)) = self.crowded else {
-            return read;
-        };
-        if read.is_ok() && self.next_word().is_err() {
-            return read;
-        }
-        let message = format!(
-            "the line has {found} values, but the header declares {declared} for this {what}"
-        );
-        Err(Fault::new(PlyPlace::Line(line), message))
-    }
-}
-
-impl Values for Ascii<'_> {
-    fn next(&mut self, _: Scalar) -> Result<f64, Problem> {
-        self.next_word()?;
-        std::str::from_utf8(&self.bytes[self.word.clone()])
-            .ok()
-            .and_then(|word| word.parse().ok())
-            .ok_or(Problem::NotANumber)
-    }
-
-    fn skip(&mut self, _: Scalar, count: u64) -> Result<(), Problem> {
-        // Ends with the file at the latest, whatever the count.
-        (0..count).try_for_each(|_| self.next_word())
-    }
-
-    fn place(&self) -> PlyPlace {
-        PlyPlace::Line(self.line)
-    }
-
-    fn remaining(&self) -> u64 {
-        (self.bytes.len() - self.at) as u64
-    }
-
-    fn end_item(&mut self, what: &'static str) {
-        let declared = std::mem::take(&mut self.words);
-        if self.crowded.is_none() {
-            let is_end = |byte: &u8| matches!(byte, b'\n' | b'\r');
-            let line = self.bytes[self.at..]
-                .split(is_end)
-                .next()
-                .unwrap_or_default();
-            let more = line
-                .split(u8::is_ascii_whitespace)
-                .filter(|word| !word.is_empty());
-            let more = more.count() as u64;
-            if more > 0 {
-                self.crowded = Some((self.line, declared + more, declared, what));
-            }
-        }
-    }
-}
-
-/// Source of values in binary files, in big-endian order if `BIG`.
-struct Binary<'a, const BIG: bool> {
-    bytes: &'a [u8],
-    at: usize,
-    /// Offset of the last value read.
-    last: usize,
-}
-
-impl<const BIG: bool> Binary<'_, BIG> {
-    #[inline]
-    fn take<const N: usize>(&mut self) -> Result<[u8; N], Problem> {
-        self.last = self.at;
-        let rest = self.bytes.get(self.at..).unwrap_or_default();
-        let mut bytes = *rest.first_chunk::<N>().ok_or(Problem::End)?;
-        self.at += N;
-        if BIG {
-            bytes.reverse();
-        }
-        Ok(bytes)
-    }
-}
-
-impl<const BIG: bool> Values for Binary<'_, BIG> {
-    #[inline]
-    fn next(&mut self, scalar: Scalar) -> Result<f64, Problem> {
-        Ok(match scalar {
-            Scalar::I8 => i8::from_le_bytes(self.take()?).into(),
-            Scalar::U8 => u8::from_le_bytes(self.take()?).into(),
-            Scalar::I16 => i16::from_le_bytes(self.take()?).into(),
-            Scalar::U16 => u16::from_le_bytes(self.take()?).into(),
-            Scalar::I32 => i32::from_le_bytes(self.take()?).into(),
-            Scalar::U32 => u32::from_le_bytes(self.take()?).into(),
-            Scalar::F32 => f32::from_le_bytes(self.take()?).into(),
-            Scalar::F64 => f64::from_le_bytes(self.take()?),
-        })
-    }
-
-    fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), Problem> {
-        self.last = self.at;
-        let bytes = count.checked_mul(scalar.size() as u64);
-        match bytes {
-            Some(bytes) if bytes <= self.remaining() => {
-                self.at += bytes as usize;
-                Ok(())
-            }
-            _ => Err(Problem::End),
-        }
-    }
-
-    fn place(&self) -> PlyPlace {
-        PlyPlace::Byte(self.last as u64)
-    }
-
-    fn remaining(&self) -> u64 {
-        (self.bytes.len() - self.at) as u64
+        let message =
+            format!("{what} {index}: vertex index {vertex} is not one of the {count} vertices");
+        Fault::new(values.place(), message).help(format!("indices are 0 to {}", count - 1))
     }
 }

@@ -130,7 +130,7 @@ impl Header {
         let message = format!(
             "the mesh needs {needed} bytes of memory, more than the {max_bytes} bytes that are allowed"
         );
-        Err(Fault::new(PlyPlace::Line(1), message))
+        Err(Fault::at_line(1, message))
     }
 
     pub fn element(&self, name: &str) -> Option<&Element> {
@@ -174,15 +174,14 @@ impl<'a> Lines<'a> {
 pub(super) fn parse(bytes: &[u8]) -> Result<Header, Fault> {
     let mut lines = Lines::new(bytes);
     if lines.next() != Some(b"ply") {
-        return Err(Fault::new(PlyPlace::Line(1), "the file is not a PLY file")
+        return Err(Fault::at_line(1, "the file is not a PLY file")
             .help("a PLY file begins with a line that says ply"));
     }
     let (mut format, mut unknown) = (None, None);
     let mut elements: Vec<Element> = Vec::new();
     loop {
         let Some(line) = lines.next() else {
-            let place = PlyPlace::Line(lines.line);
-            return Err(Fault::new(place, "the file ends in its header")
+            return Err(Fault::at_line(lines.line, "the file ends in its header")
                 .help("a header ends with a line that says end_header"));
         };
         let place = PlyPlace::Line(lines.line);
@@ -224,7 +223,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, Fault> {
         }
     }
     let format = format.ok_or_else(|| {
-        Fault::new(PlyPlace::Line(lines.line), "the header has no format line")
+        Fault::at_line(lines.line, "the header has no format line")
             .help("such as format binary_little_endian 1.0")
     })?;
     Ok(Header {

@@ -8,10 +8,12 @@
 //! holds is refused before memory is taken.
 //!
 //! - `header`: format, elements and properties
-//! - `body`: values, in the order of the header
+//! - `body`: vertices and faces, in the order of the header
+//! - `values`: single values, of ASCII and binary files
 
 mod body;
 mod header;
+mod values;
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -85,6 +87,10 @@ impl Fault {
         }
     }
 
+    fn at_line(line: u64, message: impl Into<String>) -> Self {
+        Self::new(PlyPlace::Line(line), message)
+    }
+
     fn of(self, path: &Path) -> PlyError {
         PlyError {
             path: path.to_path_buf(),
@@ -119,7 +125,7 @@ pub fn load_ply(path: &Path) -> Result<TriangleMesh, Error> {
 /// # Errors
 /// As [`load_ply`]. [`Error::Io`] for a larger file, and [`Error::Ply`] for a larger mesh.
 pub fn load_ply_within(path: &Path, max_bytes: u64) -> Result<TriangleMesh, Error> {
-    load_ply_from(path, max_bytes, DVec3::ZERO)
+    Ok(load(path, &Wanted::mesh(max_bytes))?.0)
 }
 
 /// Reads a PLY file as [`load_ply_within`], with positions that are measured from `origin`, and rounded after that.
@@ -128,7 +134,11 @@ pub(crate) fn load_ply_from(
     max_bytes: u64,
     origin: DVec3,
 ) -> Result<TriangleMesh, Error> {
-    Ok(load(path, max_bytes, false, origin)?.0)
+    let wanted = Wanted {
+        origin,
+        ..Wanted::mesh(max_bytes)
+    };
+    Ok(load(path, &wanted)?.0)
 }
 
 /// Reads a PLY file as [`load_ply_within`], and the colours of its vertices if there are any. Positions are measured from
@@ -144,7 +154,12 @@ pub fn load_colored_ply_within(
     max_bytes: u64,
     origin: DVec3,
 ) -> Result<ColoredPly, Error> {
-    let (mesh, flat, unknown) = load(path, max_bytes, true, origin)?;
+    let wanted = Wanted {
+        max_bytes,
+        colors: true,
+        origin,
+    };
+    let (mesh, flat, unknown) = load(path, &wanted)?;
     let note = || format!("{flat} faces of fewer than three corners are left out");
     Ok(ColoredPly {
         mesh,
@@ -165,25 +180,43 @@ pub struct ColoredPly {
     pub warning: Option<PlyError>,
 }
 
+/// What a caller wants of a file.
+struct Wanted {
+    /// Most memory for the file and its mesh, or for the mesh alone where the bytes are there.
+    max_bytes: u64,
+    colors: bool,
+    /// Point from which positions are measured before they are rounded.
+    origin: DVec3,
+}
+
+impl Wanted {
+    fn mesh(max_bytes: u64) -> Self {
+        Self {
+            max_bytes,
+            colors: false,
+            origin: DVec3::ZERO,
+        }
+    }
+}
+
 /// Mesh, the number of faces of fewer than three corners, and a line of the header that is not known.
 type Counted = (TriangleMesh, u64, Option<Fault>);
 
-fn load(path: &Path, max_bytes: u64, colors: bool, origin: DVec3) -> Result<Counted, Error> {
+fn load(path: &Path, wanted: &Wanted) -> Result<Counted, Error> {
     const LIMIT: u64 = 1 << 34;
     // Of other files the first bytes are enough for the error.
     let starts = |bytes: &[u8]| antumbra_scene::without_mark(bytes).starts_with(b"ply");
-    let limit = LIMIT.min(max_bytes);
+    let limit = LIMIT.min(wanted.max_bytes);
     let bytes = read_regular_file_that(path, limit, starts).map_err(|source| Error::Io {
         path: path.to_path_buf(),
         source,
     })?;
-    parse_within(
-        &bytes,
-        path,
-        max_bytes - (bytes.len() as u64).min(max_bytes),
-        colors,
-        origin,
-    )
+    let max_bytes = wanted.max_bytes.saturating_sub(bytes.len() as u64);
+    let rest = Wanted {
+        max_bytes,
+        ..*wanted
+    };
+    parse(&bytes, &rest).map_err(|fault| Error::Ply(fault.of(path)))
 }
 
 /// Reads a mesh from the bytes of a PLY file. Errors name `path`, which need not exist.
@@ -191,38 +224,20 @@ fn load(path: &Path, max_bytes: u64, colors: bool, origin: DVec3) -> Result<Coun
 /// # Errors
 /// [`Error::Ply`], as for [`load_ply`].
 pub fn parse_ply(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Error> {
-    Ok(parse_within(bytes, path, u64::MAX, false, DVec3::ZERO)?.0)
+    match parse(bytes, &Wanted::mesh(u64::MAX)) {
+        Ok((mesh, ..)) => Ok(mesh),
+        Err(fault) => Err(Error::Ply(fault.of(path))),
+    }
 }
 
-fn parse_within(
-    bytes: &[u8],
-    path: &Path,
-    max_bytes: u64,
-    colors: bool,
-    origin: DVec3,
-) -> Result<Counted, Error> {
-    let read = mesh_within(bytes, max_bytes, colors, origin);
-    read.map_err(|fault| Error::Ply(fault.of(path)))
-}
-
-#[cfg(test)]
-fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
-    Ok(mesh_within(bytes, u64::MAX, true, DVec3::ZERO)?.0)
-}
-
-fn mesh_within(
-    bytes: &[u8],
-    max_bytes: u64,
-    colors: bool,
-    origin: DVec3,
-) -> Result<Counted, Fault> {
+fn parse(bytes: &[u8], wanted: &Wanted) -> Result<Counted, Fault> {
     let mut header = header::parse(bytes)?;
     let unknown = header.unknown.take();
-    let most_triangles = header.check_memory(max_bytes)?;
-    let (mesh, flat) = body::parse(bytes, &header, most_triangles, colors, origin)?;
+    let most_triangles = header.check_memory(wanted.max_bytes)?;
+    let (mesh, flat) = body::parse(bytes, &header, most_triangles, wanted)?;
     match unknown {
         // Scenes of pbrt are as strict as pbrt.
-        Some(fault) if !colors => Err(fault),
+        Some(fault) if !wanted.colors => Err(fault),
         unknown => Ok((mesh, flat, unknown)),
     }
 }

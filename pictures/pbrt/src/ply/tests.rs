@@ -1,8 +1,20 @@
 //! Tests of the PLY reader on bytes in memory.
 
-use glam::DVec3;
+use antumbra_scene::TriangleMesh;
 
-use super::{PlyPlace, mesh_within, parse};
+use super::{Counted, Fault, PlyPlace, Wanted};
+
+fn mesh_within(bytes: &[u8], max_bytes: u64, colors: bool) -> Result<Counted, Fault> {
+    let wanted = Wanted {
+        colors,
+        ..Wanted::mesh(max_bytes)
+    };
+    super::parse(bytes, &wanted)
+}
+
+fn parse(bytes: &[u8]) -> Result<TriangleMesh, Fault> {
+    Ok(mesh_within(bytes, u64::MAX, true)?.0)
+}
 
 fn bytes_of(lines: &str) -> Vec<u8> {
     lines.trim_start().as_bytes().to_vec()
@@ -266,11 +278,11 @@ fn polygons_are_split_and_lesser_faces_counted() {
         "element face 5\nLIST",
         "4 0 1 2 3\n0\n1 2\n2 0 1\n3 0 1 3\n",
     );
-    let (mesh, count, unknown) = mesh_within(text.as_bytes(), u64::MAX, true, DVec3::ZERO).unwrap();
+    let (mesh, count, unknown) = mesh_within(text.as_bytes(), u64::MAX, true).unwrap();
     assert_eq!((mesh.indices.len(), count, unknown), (3, 3, None));
     // A comment that does not say so.
     let odd = text.replace("format ascii 1.0", "format ascii 1.0\nmade by hand");
-    let within = |colors| mesh_within(odd.as_bytes(), u64::MAX, colors, DVec3::ZERO);
+    let within = |colors| mesh_within(odd.as_bytes(), u64::MAX, colors);
     let (same, _, unknown) = within(true).unwrap();
     let unknown = unknown.unwrap();
     assert_eq!(same, mesh);
@@ -313,7 +325,7 @@ fn strips_turn_every_other_triangle_and_end_at_minus_one() {
     assert_eq!(parse(both.as_bytes()).unwrap().indices.len(), 1);
     // Two triangles take 24 bytes beside four vertices.
     let text = flat(&square, "element tristrips 1\nLIST", "4 0 1 2 3\n");
-    let within = |bytes| mesh_within(text.as_bytes(), bytes, false, DVec3::ZERO);
+    let within = |bytes| mesh_within(text.as_bytes(), bytes, false);
     assert!(within(4 * 32 + 24).is_ok());
     let fault = within(4 * 32 + 12).unwrap_err();
     assert!(

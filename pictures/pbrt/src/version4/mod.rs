@@ -12,6 +12,7 @@ use glam::DMat3;
 
 use crate::directive::{Directive, Quoted};
 use crate::lexer::{Lexer, TokenKind, is_binary};
+use crate::material::version4::SUPPORTED;
 use crate::params::{ParamType, Params, Values};
 use crate::report::Report;
 use crate::source::Span;
@@ -20,61 +21,34 @@ use crate::texture::{self, TextureSpace};
 
 /// Directives that only version 4 has.
 pub(crate) const DIRECTIVES: &[&str] = &["Attribute", "ColorSpace", "Import", "Option"];
-/// Names that only version 4 has, after their directives.
-const KINDS: &[(&str, &[&str])] = &[
-    ("Film", &["rgb", "gbuffer", "spectral"]),
+/// Directive, whether its names are of version 4, and names that only that version has.
+const KINDS: &[(&str, bool, &[&str])] = &[
+    ("Film", true, &["rgb", "gbuffer", "spectral"]),
+    ("Film", false, &["image"]),
     (
         "Integrator",
-        &[
-            "simplepath",
-            "simplevolpath",
-            "randomwalk",
-            "lightpath",
-            "function",
-        ],
+        true,
+        &["simplepath", "simplevolpath", "randomwalk"],
     ),
+    ("Integrator", true, &["lightpath", "function"]),
+    ("Integrator", false, &["directlighting", "whitted"]),
+    ("Material", true, SUPPORTED),
+    ("Material", true, &["interface", "measured"]),
     (
         "Material",
-        &[
-            "coatedconductor",
-            "coateddiffuse",
-            "conductor",
-            "dielectric",
-            "diffuse",
-            "diffusetransmission",
-            "interface",
-            "measured",
-            "thindielectric",
-        ],
+        false,
+        &["disney", "fourier", "glass", "matte", "metal", "mirror"],
     ),
+    ("Material", false, &["kdsubsurface", "plastic", "substrate"]),
+    ("Material", false, &["translucent", "uber"]),
     (
         "Sampler",
+        true,
         &["independent", "paddedsobol", "pmj02bn", "zsobol"],
     ),
-];
-
-/// Names that only version 3 has, after their directives.
-const OLD_KINDS: &[(&str, &[&str])] = &[
-    ("Film", &["image"]),
-    ("Integrator", &["directlighting", "whitted"]),
-    (
-        "Material",
-        &[
-            "disney",
-            "fourier",
-            "glass",
-            "kdsubsurface",
-            "matte",
-            "metal",
-            "mirror",
-            "plastic",
-            "substrate",
-            "translucent",
-            "uber",
-        ],
-    ),
     (
         "Sampler",
+        false,
         &["02sequence", "lowdiscrepancy", "maxmindist", "random"],
     ),
 ];
@@ -88,41 +62,32 @@ pub(crate) fn is_version4(report: &Report, file: u32) -> bool {
         return false;
     }
     let mut lexer = Lexer::new(report, file);
-    let mut directive: &[u8] = b"";
+    let mut before = None;
     while let Some(token) = lexer.scan() {
         let text = lexer.slice(token);
-        if token.kind == TokenKind::Word && DIRECTIVES.iter().any(|name| name.as_bytes() == text) {
-            return true;
-        }
-        if token.kind == TokenKind::Text {
-            let kind = &text[1..text.len() - 1];
-            if has(KINDS, directive, kind) {
+        match (token.kind, before) {
+            (TokenKind::Word, _) if DIRECTIVES.iter().any(|name| name.as_bytes() == text) => {
                 return true;
             }
-            if has(OLD_KINDS, directive, kind) {
-                return false;
+            (TokenKind::Text, Some(word)) => {
+                let kind = &text[1..text.len() - 1];
+                if let Some(is_version4) = version_of(lexer.slice(word), kind) {
+                    return is_version4;
+                }
             }
+            _ => {}
         }
-        directive = match token.kind {
-            TokenKind::Word => named(text),
-            _ => b"",
-        };
+        before = (token.kind == TokenKind::Word).then_some(token);
     }
     false
 }
 
-/// Whether a table has this name after this directive.
-fn has(table: &[(&str, &[&str])], directive: &[u8], kind: &[u8]) -> bool {
-    let mut rows = table.iter();
-    rows.any(|(of, kinds)| {
-        of.as_bytes() == directive && kinds.iter().any(|known| known.as_bytes() == kind)
-    })
-}
-
-/// The directive that a word is, if only one version has it.
-fn named(word: &[u8]) -> &'static [u8] {
-    let mut names = KINDS.iter().map(|(of, _)| of.as_bytes());
-    names.find(|of| *of == word).unwrap_or_default()
+/// Whether this name after this directive is of version 4, if only one version has it.
+fn version_of(directive: &[u8], kind: &[u8]) -> Option<bool> {
+    let is_kind = |name: &&str| name.as_bytes() == kind;
+    let mut rows = KINDS.iter();
+    let row = rows.find(|(of, _, names)| of.as_bytes() == directive && names.iter().any(is_kind));
+    row.map(|(_, is_version4, _)| *is_version4)
 }
 
 /// Says in one sentence that a scene is of version 4: before its mistakes, or as a note.
@@ -475,6 +440,9 @@ pub(crate) fn normal_map(
 /// Chromaticities of the primaries and of white of a colour space, as in its standard.
 type Primaries = [[f64; 2]; 4];
 
+/// White of daylight (CIE D65).
+const D65: [f64; 2] = [0.31271, 0.32902];
+
 const COLOR_SPACES: &[(&str, Primaries)] = &[
     (
         "aces2065-1",
@@ -487,30 +455,15 @@ const COLOR_SPACES: &[(&str, Primaries)] = &[
     ),
     (
         "dci-p3",
-        [
-            [0.680, 0.320],
-            [0.265, 0.690],
-            [0.150, 0.060],
-            [0.31271, 0.32902],
-        ],
+        [[0.680, 0.320], [0.265, 0.690], [0.150, 0.060], D65],
     ),
     (
         "rec2020",
-        [
-            [0.708, 0.292],
-            [0.170, 0.797],
-            [0.131, 0.046],
-            [0.31271, 0.32902],
-        ],
+        [[0.708, 0.292], [0.170, 0.797], [0.131, 0.046], D65],
     ),
     (
         "srgb",
-        [
-            [0.640, 0.330],
-            [0.300, 0.600],
-            [0.150, 0.060],
-            [0.31271, 0.32902],
-        ],
+        [[0.640, 0.330], [0.300, 0.600], [0.150, 0.060], D65],
     ),
 ];
 

@@ -19,92 +19,96 @@ struct Group {
     scene: &'static str,
 }
 
+impl Group {
+    fn new(heading: &'static str, supported: &[&'static str], scene: &'static str) -> Self {
+        Self {
+            heading,
+            supported: supported.to_vec(),
+            unsupported: &[],
+            scene,
+        }
+    }
+
+    fn without(mut self, unsupported: &'static [&'static str]) -> Self {
+        self.unsupported = unsupported;
+        self
+    }
+}
+
 static GROUPS: LazyLock<Vec<Group>> = LazyLock::new(|| {
     vec![
-        Group {
-            heading: "Cameras",
-            supported: camera::SUPPORTED.to_vec(),
-            unsupported: &[],
-            scene: r#"Camera "NAME" WorldBegin WorldEnd"#,
-        },
-        Group {
-            heading: "Filters",
-            supported: film::FILTERS.to_vec(),
-            unsupported: &[],
-            scene: r#"PixelFilter "NAME" WorldBegin WorldEnd"#,
-        },
-        Group {
-            heading: "Samplers",
-            supported: settings::SAMPLERS.to_vec(),
-            unsupported: &[],
-            scene: r#"Sampler "NAME" WorldBegin WorldEnd"#,
-        },
-        Group {
-            heading: "Integrators",
-            supported: settings::INTEGRATORS.to_vec(),
-            unsupported: &[],
-            scene: r#"Integrator "NAME" WorldBegin WorldEnd"#,
-        },
-        Group {
-            heading: "Accelerators",
-            supported: settings::ACCELERATORS.to_vec(),
-            unsupported: &[],
-            scene: r#"Accelerator "NAME" WorldBegin WorldEnd"#,
-        },
-        Group {
-            heading: "Shapes",
-            supported: shape::SUPPORTED.to_vec(),
-            unsupported: &[],
-            scene: r#"WorldBegin Shape "NAME" WorldEnd"#,
-        },
-        Group {
-            heading: "Materials",
-            supported: material::supported(),
-            unsupported: &[],
-            scene: r#"WorldBegin Material "NAME" WorldEnd"#,
-        },
-        Group {
-            heading: "Materials of pbrt-v4",
-            supported: material::version4::SUPPORTED.to_vec(),
-            unsupported: material::version4::UNSUPPORTED,
-            scene: r#"Film "rgb" WorldBegin Material "NAME""#,
-        },
-        Group {
-            heading: "Shapes of pbrt-v4",
-            supported: shape::SUPPORTED4.to_vec(),
-            unsupported: &[],
-            scene: r#"Film "rgb" WorldBegin Shape "NAME""#,
-        },
-        Group {
-            heading: "Textures",
-            supported: texture::SUPPORTED.to_vec(),
-            unsupported: texture::UNSUPPORTED,
-            scene: r#"WorldBegin Texture "t" "color" "NAME" Material "matte" "texture Kd" "t" WorldEnd"#,
-        },
-        Group {
-            heading: "Mappings",
-            supported: texture::MAPPINGS.to_vec(),
-            unsupported: &[],
-            scene: r#"WorldBegin Texture "t" "color" "bilerp" "string mapping" "NAME" WorldEnd"#,
-        },
-        Group {
-            heading: "Lights",
-            supported: light::supported(),
-            unsupported: &[],
-            scene: r#"WorldBegin LightSource "NAME" WorldEnd"#,
-        },
-        Group {
-            heading: "Area lights",
-            supported: light::SUPPORTED_AREA.to_vec(),
-            unsupported: &[],
-            scene: r#"WorldBegin AreaLightSource "NAME" WorldEnd"#,
-        },
-        Group {
-            heading: "Media",
-            supported: medium::SUPPORTED.to_vec(),
-            unsupported: &[],
-            scene: r#"WorldBegin MakeNamedMedium "m" "string type" "NAME" "float density" 1 WorldEnd"#,
-        },
+        Group::new(
+            "Cameras",
+            camera::SUPPORTED,
+            r#"Camera "NAME" WorldBegin WorldEnd"#,
+        ),
+        Group::new(
+            "Filters",
+            film::FILTERS,
+            r#"PixelFilter "NAME" WorldBegin WorldEnd"#,
+        ),
+        Group::new(
+            "Samplers",
+            settings::SAMPLERS,
+            r#"Sampler "NAME" WorldBegin WorldEnd"#,
+        ),
+        Group::new(
+            "Integrators",
+            settings::INTEGRATORS,
+            r#"Integrator "NAME" WorldBegin WorldEnd"#,
+        ),
+        Group::new(
+            "Accelerators",
+            settings::ACCELERATORS,
+            r#"Accelerator "NAME" WorldBegin WorldEnd"#,
+        ),
+        Group::new(
+            "Shapes",
+            shape::SUPPORTED,
+            r#"WorldBegin Shape "NAME" WorldEnd"#,
+        ),
+        Group::new(
+            "Materials",
+            &material::supported(),
+            r#"WorldBegin Material "NAME" WorldEnd"#,
+        ),
+        Group::new(
+            "Materials of pbrt-v4",
+            material::version4::SUPPORTED,
+            r#"Film "rgb" WorldBegin Material "NAME""#,
+        )
+        .without(material::version4::UNSUPPORTED),
+        Group::new(
+            "Shapes of pbrt-v4",
+            shape::SUPPORTED4,
+            r#"Film "rgb" WorldBegin Shape "NAME""#,
+        ),
+        Group::new(
+            "Textures",
+            texture::SUPPORTED,
+            r#"WorldBegin Texture "t" "color" "NAME" Material "matte" "texture Kd" "t" WorldEnd"#,
+        )
+        .without(texture::UNSUPPORTED),
+        Group::new(
+            "Mappings",
+            texture::MAPPINGS,
+            r#"WorldBegin Texture "t" "color" "bilerp" "string mapping" "NAME" WorldEnd"#,
+        ),
+        Group::new(
+            "Lights",
+            &light::supported(),
+            r#"WorldBegin LightSource "NAME" WorldEnd"#,
+        ),
+        Group::new(
+            "Area lights",
+            light::SUPPORTED_AREA,
+            r#"WorldBegin AreaLightSource "NAME" WorldEnd"#,
+        ),
+        Group::new(
+            "Media",
+            medium::SUPPORTED,
+            r#"WorldBegin MakeNamedMedium "m" "string type" "NAME" "float density" 1 WorldEnd"#,
+        ),
     ]
 });
 
