@@ -13,7 +13,7 @@
 
 use std::ops::ControlFlow;
 
-use antumbra::{Hit, Ray};
+use antumbra::Ray;
 use antumbra_scene::DirectStrategy;
 use glam::Vec3;
 
@@ -23,7 +23,7 @@ use super::path::{receiver, shade};
 use super::tracer::Tracer;
 use super::{Batch, ENOUGH, ShadowQueue, dimension, power_heuristic};
 use crate::columns::BLOCK;
-use crate::light::{ElementSample, Light, LightBlock, LightSample, Receiver, before};
+use crate::light::{ElementSample, Light, LightBlock, LightSample, Receiver};
 use crate::material::bsdf::Bsdf;
 use crate::sampler::{Stream, mix};
 use crate::surface::{Frame, Surface};
@@ -88,7 +88,7 @@ struct Probes {
     rays: Vec<Ray>,
     probes: Vec<Probe>,
     /// Emitter on the way of each probe, if there is one.
-    hits: Vec<Option<Hit>>,
+    hits: Hits,
     shadows: ShadowQueue,
 }
 
@@ -512,14 +512,12 @@ impl Probes {
         batch: &mut Batch,
         strategy: DirectStrategy,
     ) {
-        world.emitters.find(&self.rays, &mut self.hits);
-        for ((ray, probe), hit) in self.rays.iter().zip(&self.probes).zip(&self.hits) {
-            let (light, ray) = match hit {
+        let Self { rays, hits, .. } = self;
+        hits.find_emitters(&world.emitters, rays);
+        for (index, (ray, probe)) in rays.iter().zip(&self.probes).enumerate() {
+            let (light, ray) = match hits.surface_and_way(&world.shapes, rays, index) {
                 None => (probe.escape(world, Vec3::from(ray.dir), strategy), *ray),
-                Some(hit) => {
-                    let surface = Surface::found(&world.shapes, ray, hit);
-                    (probe.meet(world, &surface, strategy), before(ray, hit))
-                }
+                Some((surface, ray)) => (probe.meet(world, &surface, strategy), ray),
             };
             let brought = probe.weight * light;
             if brought != Vec3::ZERO {

@@ -4,6 +4,7 @@ use antumbra::{Hit, Isa, Ray};
 
 use super::tracer::Tracer;
 use crate::columns::BLOCK;
+use crate::light::{EmitterTree, before};
 use crate::surface::{Shapes, Surface, SurfaceBlock};
 
 /// Hits of the rays of one stage.
@@ -40,6 +41,12 @@ impl Hits {
         self.block = None;
     }
 
+    /// Finds the first emitter on each ray, whatever is before it. Earlier hits are forgotten.
+    pub fn find_emitters(&mut self, emitters: &EmitterTree, rays: &[Ray]) {
+        emitters.find(rays, &mut self.hits);
+        self.block = None;
+    }
+
     /// Surface that ray `index` of the traced `rays` has hit. Quick if called with ascending indices.
     pub fn surface(&mut self, shapes: &Shapes, rays: &[Ray], index: usize) -> Option<Surface> {
         self.hits[index].as_ref()?;
@@ -63,6 +70,17 @@ impl Hits {
             self.surfaces
                 .surface(usize::from(self.lanes[index % BLOCK])),
         )
+    }
+
+    /// Surface that ray `index` of the traced `rays` has hit, and the part of the ray before it.
+    pub fn surface_and_way(
+        &mut self,
+        shapes: &Shapes,
+        rays: &[Ray],
+        index: usize,
+    ) -> Option<(Surface, Ray)> {
+        let way = before(&rays[index], self.hit(index)?);
+        Some((self.surface(shapes, rays, index)?, way))
     }
 
     /// Prefetches the triangles hit at these places, whose surfaces will be computed.

@@ -31,6 +31,8 @@ use serde::{Deserialize, Serialize};
 use crate::film::Sample;
 use crate::sampler::{Sampler, Stream};
 use crate::world::{Camera, World};
+pub use hits::Hits;
+pub use path::shade;
 pub use queries::{Observer, PathBatch, Queries};
 use shadow::ShadowQueue;
 pub use tracer::{Counts, Observe, Tracer};

@@ -8,11 +8,9 @@ use rayon::prelude::*;
 
 use crate::Error;
 use crate::film::Sample;
-use crate::integrator::{Batch, Observe, Tracer};
-use crate::material::Material;
-use crate::material::bsdf::Bsdf;
+use crate::integrator::{Batch, Hits, Observe, Tracer, shade};
 use crate::sampler::{Method, Sampler};
-use crate::surface::{Frame, Surface};
+use crate::surface::Frame;
 use crate::world::World;
 
 /// Means over the first surfaces that the samples of every pixel hit.
@@ -74,7 +72,7 @@ impl Layers {
             .into_par_iter()
             .map(|y| {
                 let mut tracer = Tracer::new(&bvh, Observe::Nothing).moving(world, moving.as_ref());
-                let mut hits = Vec::new();
+                let mut hits = Hits::default();
                 let mut batch = Batch::default();
                 let pixel = |x: i32| {
                     batch.clear();
@@ -83,9 +81,9 @@ impl Layers {
                         batch.push(&world.camera, &sampler, Sample { pixel, index });
                     }
                     tracer.begin(&batch.times);
-                    tracer.intersect(&batch.rays, 0..samples, &mut hits);
-                    let step = 1.0 / (texture_spp.unwrap_or(spp).max(1) as f32).sqrt();
-                    mean(world, &batch, &hits, step)
+                    hits.find(&mut tracer, &batch.rays, 0..samples);
+                    batch.step = 1.0 / (texture_spp.unwrap_or(spp).max(1) as f32).sqrt();
+                    mean(world, &batch, &mut hits)
                 };
                 (x0..x1).map(pixel).collect()
             })
@@ -110,42 +108,27 @@ impl Layers {
 }
 
 /// Mean over the samples of a pixel.
-fn mean(world: &World, batch: &Batch, hits: &[Option<antumbra::Hit>], step: f32) -> Pixel {
+fn mean(world: &World, batch: &Batch, hits: &mut Hits) -> Pixel {
     let mut sum = Pixel::default();
     let mut found = 0.0;
-    for ((ray, hit), sample) in batch.rays.iter().zip(hits).zip(0..) {
-        let Some(hit) = hit else {
+    for (index, ray) in batch.rays.iter().enumerate() {
+        let surface = hits.surface(&world.shapes, &batch.rays, index);
+        let (Some(surface), Some(hit)) = (surface, hits.hit(index)) else {
             continue;
         };
-        let surface = Surface::found(&world.shapes, ray, hit);
-        let moved = batch.camera(world, sample);
+        let moved = batch.camera(world, index as u32);
         let camera = moved.as_ref().unwrap_or(&world.camera);
-        let neighbours = camera.neighbours(ray, step);
-        let (bsdf, frame) = match world.material(surface.shape) {
-            Material::None => (Bsdf::black(), Frame::around(surface.shading_normal)),
-            Material::Constant(bsdf) => {
-                let frame = if bsdf.is_anisotropic() {
-                    Frame::along(surface.shading_normal, surface.tangent(&world.shapes))
-                } else {
-                    Frame::around(surface.shading_normal)
-                };
-                (Bsdf::clone(bsdf), frame)
-            }
-            Material::Varying(varying) => {
-                varying.shade(&world.shapes, &surface, hit, Some(&neighbours))
-            }
-        };
+        let shaded = shade(world, batch, (ray, index as u32, true), &surface, hit);
         found += 1.0;
-        let facing = |normal: Vec3| {
-            if normal.dot(surface.wo) < 0.0 {
-                -normal
-            } else {
-                normal
+        let frame = match shaded {
+            Some((bsdf, frame)) => {
+                sum.albedo += bsdf.reflectance(frame.to_local(surface.wo));
+                frame
             }
+            None => Frame::around(surface.shading_normal),
         };
-        sum.albedo += bsdf.reflectance(frame.to_local(surface.wo));
-        sum.normal += facing(surface.normal);
-        sum.shading_normal += facing(frame.to_world(Vec3::Z));
+        sum.normal += surface.facing_normal();
+        sum.shading_normal += surface.facing(frame.to_world(Vec3::Z));
         sum.position += surface.point;
         sum.depth += camera.depth(surface.point);
     }

@@ -1,7 +1,7 @@
 //! Surfaces of many hits at once, in columns.
 //!
 //! Vertices miss the cache. They are prefetched for the whole block, so that the misses of different hits overlap.
-//! The rest is computed in vectors. Every lane has the bits of [`Surface::at`].
+//! The rest is computed in vectors. A lane has the same bits whatever the other lanes have, on every instruction set.
 
 use antumbra::{Hit, INVALID_ID, Isa, Ray};
 use antumbra_scene::{Geometry, TriangleMesh};

@@ -1,16 +1,14 @@
 //! A point of a surface, and the rays that leave it.
 
-use antumbra::{Hit, Ray};
+use antumbra::{Hit, Isa, Ray};
 use antumbra_scene::{Geometry, Shape, Sphere};
 use glam::Vec3;
 
-use super::curve::{CurvePoint, tangent_near};
-use super::origin_offset::{self, EDGE_ERRORS, Room, offset, offset_distance, segment};
+use super::block::SurfaceBlock;
+use super::curve::tangent_near;
+use super::origin_offset::{self, Room, offset, offset_distance, segment};
 use super::shapes::{Placement, Shapes};
-use super::triangle::{
-    DEFAULT_UV, Plane, Vertices, corners, edge_distance, gamma, inset, interpolate,
-    triangle_normals,
-};
+use super::triangle::{DEFAULT_UV, corners, gamma, inset};
 
 /// A point of a surface, as shading needs it.
 #[derive(Clone, Copy, Debug)]
@@ -40,90 +38,11 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Surface at a hit that `ray` found among `shapes`. `vertices` of the triangle and its `plane` are ignored on
-    /// spheres and curves.
-    #[inline]
-    pub fn at(shapes: &Shapes, ray: &Ray, hit: &Hit, vertices: &Vertices, plane: &Plane) -> Self {
-        let index = shapes.index_of(hit);
-        let shape = &shapes[index];
-        let placement = shapes.placement(hit);
-        let placement = placement.as_deref();
-        let dir = Vec3::from(ray.dir);
-        let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
-        // In the space of the object, if there is one.
-        let (point, error, normal, shading_normal, edge) = match &shape.geometry {
-            Geometry::Mesh(_) => {
-                let (point, error) = interpolate(vertices.corners, weights);
-                let (normal, shading) = triangle_normals(shape, vertices, plane.normal, weights);
-                let edge = edge_distance(vertices.corners, weights, plane.double_area);
-                (point, error, normal, shading, edge)
-            }
-            Geometry::Sphere(sphere) => {
-                let (point, error, normal) = on_sphere(shape, sphere, placement, ray, hit);
-                (point, error, normal, normal, f32::INFINITY)
-            }
-            Geometry::Curves(curves) => {
-                let wo = (-dir).normalize();
-                let found = CurvePoint::new(shapes, (index, curves), hit, wo, placement);
-                return Self {
-                    point: found.point,
-                    start: found.start,
-                    distance: found.distance,
-                    origin_offset: shapes.origin_offset,
-                    origin: offset(found.start, found.normal, found.distance, wo),
-                    normal: found.normal,
-                    shading_normal: found.normal,
-                    wo,
-                    shape: index,
-                    inst_id: hit.inst_id,
-                    primitive: hit.prim_id,
-                };
-            }
-        };
-        let (point, error, normal, shading_normal, scale) = match placement {
-            Some(placement) => {
-                let (point, error) = placement.point(point, error);
-                let normals = [normal, shading_normal].map(|normal| placement.normal(normal));
-                let scale = placement.least_scale;
-                (point, error, normals[0], normals[1], scale)
-            }
-            None => (point, error, normal, shading_normal, 1.0),
-        };
-        let wanted = EDGE_ERRORS * error.max_element();
-        let (start, edge) = if edge * scale < wanted {
-            start_inside(vertices.corners, weights, edge, wanted / scale, placement)
-        } else {
-            (point, edge)
-        };
-        let room = Room {
-            edge: edge * scale,
-            height: hit.t * dir.dot(normal).abs(),
-        };
-        let distance = offset_distance(error, normal, shapes.origin_offset, room);
-        let wo = (-dir).normalize();
-        Self {
-            point,
-            start,
-            distance,
-            origin_offset: shapes.origin_offset,
-            origin: offset(start, normal, distance, wo),
-            normal,
-            shading_normal,
-            wo,
-            shape: index,
-            inst_id: hit.inst_id,
-            primitive: hit.prim_id,
-        }
-    }
-
-    /// Surface at a hit, with vertices fetched from the mesh.
+    /// Surface at a hit that `ray` found among `shapes`: a block of one hit, see [`SurfaceBlock`].
     pub fn found(shapes: &Shapes, ray: &Ray, hit: &Hit) -> Self {
-        let vertices = match &shapes[shapes.index_of(hit)].geometry {
-            Geometry::Mesh(mesh) => Vertices::new(mesh, mesh.indices[hit.prim_id as usize]),
-            Geometry::Sphere(_) | Geometry::Curves(_) => Vertices::default(),
-        };
-        let plane = Plane::new(vertices.corners);
-        Self::at(shapes, ray, hit, &vertices, &plane)
+        let mut block = Box::<SurfaceBlock>::default();
+        block.compute(Isa::best(), shapes, &[*ray], &[Some(*hit)], &[0]);
+        block.surface(0)
     }
 
     /// Whether a direction lies on the side of the geometric surface from which the ray came.
@@ -135,10 +54,16 @@ impl Surface {
     /// Geometric normal, turned to the side from which the ray came.
     #[inline]
     pub fn facing_normal(&self) -> Vec3 {
-        if self.normal.dot(self.wo) < 0.0 {
-            -self.normal
+        self.facing(self.normal)
+    }
+
+    /// A normal, turned to the side from which the ray came.
+    #[inline]
+    pub fn facing(&self, normal: Vec3) -> Vec3 {
+        if normal.dot(self.wo) < 0.0 {
+            -normal
         } else {
-            self.normal
+            normal
         }
     }
 

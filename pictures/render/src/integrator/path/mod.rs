@@ -36,7 +36,7 @@ use super::hits::Hits;
 use super::tracer::Tracer;
 use super::{Batch, ShadowQueue, dimension, power_heuristic};
 use crate::columns::BLOCK;
-use crate::light::{LightBlock, Receiver, before};
+use crate::light::{LightBlock, Receiver};
 use crate::material::Material;
 use crate::material::bsdf::{Bsdf, Evaluation};
 use crate::surface::{Frame, Surface};
@@ -66,7 +66,7 @@ pub struct PathTracer {
     through: Paths,
     hits: Hits,
     /// Emitters on the way of the last rays.
-    lit: Vec<Option<Hit>>,
+    lit: Hits,
     /// Places of the rays that hit something.
     met: Vec<u32>,
     block: Box<Block>,
@@ -142,7 +142,7 @@ impl PathTracer {
             next: Paths::default(),
             through: Paths::default(),
             hits: Hits::default(),
-            lit: Vec::new(),
+            lit: Hits::default(),
             met: Vec::new(),
             block: Box::default(),
         }
@@ -272,8 +272,8 @@ impl PathTracer {
     /// Queues the last rays, each as a shadow ray to the first light on its way. Other surfaces do not matter.
     fn end(&mut self, world: &World, batch: &mut Batch, shadows: &mut ShadowQueue) {
         let Paths { rays, states } = &self.current;
-        world.emitters.find(rays, &mut self.lit);
-        for ((ray, state), hit) in rays.iter().zip(states).zip(&self.lit) {
+        self.lit.find_emitters(&world.emitters, rays);
+        for (index, (ray, state)) in rays.iter().zip(states).enumerate() {
             let State {
                 sample,
                 throughput,
@@ -282,12 +282,9 @@ impl PathTracer {
             } = *state;
             // A throughput that is not finite spoils its sample, even without a hit.
             batch.emitted[sample as usize] += throughput * Vec3::ZERO;
-            let (light, ray) = match hit {
+            let (light, ray) = match self.lit.surface_and_way(&world.shapes, rays, index) {
                 None => (escaped_light(world, origin, Vec3::from(ray.dir)), *ray),
-                Some(hit) => {
-                    let surface = Surface::found(&world.shapes, ray, hit);
-                    (emitted_light(world, origin, &surface), before(ray, hit))
-                }
+                Some((surface, ray)) => (emitted_light(world, origin, &surface), ray),
             };
             let brought = throughput * light;
             if brought != Vec3::ZERO {
@@ -303,7 +300,7 @@ pub(super) fn first_dimension(depth: u32) -> u32 {
 }
 
 /// BSDF of the surface that a ray of a sample hits, and its frame. `None` without a material.
-pub(super) fn shade<'a>(
+pub fn shade<'a>(
     world: &'a World,
     batch: &Batch,
     (ray, sample, from_camera): (&Ray, u32, bool),
