@@ -168,22 +168,13 @@ impl Library {
         }
         let mut output = vec![[0.0; 3]; expected];
         let functions = &self.functions;
-        let set = |filter: Handle, name: &CStr, values: *mut [f32; 3]| {
+        let set = |filter, name: &CStr, values: *mut [f32; 3]| {
+            let (name, values) = (name.as_ptr(), values.cast());
             // SAFETY: a function of the loaded library, with the signature of its header. The filter exists. `values` has
             // `width * height` elements of three floats, as checked above, and outlives the filter. The library writes
             // only to the output.
             unsafe {
-                (functions.set_image)(
-                    filter,
-                    name.as_ptr(),
-                    values.cast(),
-                    FLOAT3,
-                    width,
-                    height,
-                    0,
-                    0,
-                    0,
-                );
+                (functions.set_image)(filter, name, values, FLOAT3, width, height, 0, 0, 0);
             }
         };
         // SAFETY: functions of the loaded library, with the signatures of its header. Handles are not null, as checked here,

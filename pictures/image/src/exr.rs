@@ -8,6 +8,7 @@ use std::io::Cursor;
 use ::exr::block;
 use ::exr::image::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Image as File, Layer, SpecificChannels,
+    write::channels::WritableChannels,
 };
 use ::exr::math::Vec2;
 use ::exr::meta::attribute::{IntegerBounds, LineOrder};
@@ -34,17 +35,52 @@ const MAX_INFLATION: u64 = 2048;
 /// Writes an image as an EXR file, a block of rows at a time. Equal images give equal bytes: no times, names or
 /// versions are stored.
 pub(crate) fn encode(image: &Image, output: &mut dyn Output) -> Result<(), Unwritten> {
-    let (window, pixels) = (image.window(), image.pixels());
-    let width = window.width();
+    let (pixels, width) = (image.pixels(), image.window().width());
     let channels = SpecificChannels::rgb(|Vec2(x, y): Vec2<usize>| {
         let [r, g, b] = pixels[y * width + x];
         (r, g, b)
     });
+    let file = file(image, None, channels);
+    let written = file.write().non_parallel().to_buffered(output);
+    written.map_err(unwritten)
+}
+
+/// Writes an image with further channels and notes. Equal values give equal bytes.
+pub(crate) fn encode_layers(
+    image: &Image,
+    further: &[Channel],
+    notes: &Notes,
+    output: &mut dyn Output,
+) -> Result<(), Unwritten> {
+    let one = |name: &str, values: Vec<f32>| AnyChannel::new(name, FlatSamples::F32(values));
+    let mut channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = SmallVec::new();
+    for (axis, name) in ["R", "G", "B"].into_iter().enumerate() {
+        let values = image.pixels().iter().map(|pixel| pixel[axis]);
+        channels.push(one(name, values.collect()));
+    }
+    for channel in further {
+        channels.push(one(&channel.name, channel.values.clone()));
+    }
+    let comments = Some(notes.text()).filter(|text| !text.is_empty());
+    let comments = comments.and_then(Text::new_or_none);
+    let file = file(image, comments, AnyChannels::sort(channels));
+    let written = file.write().non_parallel().to_buffered(output);
+    written.map_err(unwritten)
+}
+
+/// A file of one layer of the image's window.
+fn file<'c, C: WritableChannels<'c> + 'c>(
+    image: &Image,
+    comments: Option<Text>,
+    channels: C,
+) -> File<Layer<C>> {
+    let window = image.window();
     let layer = Layer::new(
-        Vec2(width, window.height()),
+        Vec2(window.width(), window.height()),
         LayerAttributes {
             layer_position: Vec2(window.x0, window.y0),
             software_name: Some(SOFTWARE.into()),
+            comments,
             ..LayerAttributes::default()
         },
         Encoding {
@@ -55,62 +91,14 @@ pub(crate) fn encode(image: &Image, output: &mut dyn Output) -> Result<(), Unwri
         channels,
     );
     let display = ImageAttributes::with_size(Vec2(image.width(), image.height()));
-    let file = File::new(display, layer);
-    let written = file.write().non_parallel().to_buffered(output);
-    written.map_err(|error| match error {
-        ::exr::error::Error::Io(error) => Unwritten::Io(error),
-        error => Unwritten::Refused(error.to_string()),
-    })
+    File::new(display, layer)
 }
 
-/// Writes an image with further channels and notes. Equal values give equal bytes.
-pub(crate) fn encode_layers(
-    image: &Image,
-    further: &[Channel],
-    notes: &Notes,
-    output: &mut dyn Output,
-) -> Result<(), Unwritten> {
-    let window = image.window();
-    let one = |name: &str, values: Vec<f32>| AnyChannel::new(name, FlatSamples::F32(values));
-    let mut channels: SmallVec<[AnyChannel<FlatSamples>; 4]> = SmallVec::new();
-    for (axis, name) in ["R", "G", "B"].into_iter().enumerate() {
-        channels.push(one(
-            name,
-            image.pixels().iter().map(|pixel| pixel[axis]).collect(),
-        ));
-    }
-    for channel in further {
-        channels.push(one(&channel.name, channel.values.clone()));
-    }
-    let text = notes.text();
-    let layer = Layer::new(
-        Vec2(window.width(), window.height()),
-        LayerAttributes {
-            layer_position: Vec2(window.x0, window.y0),
-            software_name: Some(SOFTWARE.into()),
-            comments: if text.is_empty() {
-                None
-            } else {
-                Text::new_or_none(text)
-            },
-            ..LayerAttributes::default()
-        },
-        Encoding {
-            compression: Compression::ZIP16,
-            blocks: Blocks::ScanLines,
-            line_order: LineOrder::Increasing,
-        },
-        AnyChannels::sort(channels),
-    );
-    let display = ImageAttributes::with_size(Vec2(image.width(), image.height()));
-    let written = File::new(display, layer)
-        .write()
-        .non_parallel()
-        .to_buffered(output);
-    written.map_err(|error| match error {
+fn unwritten(error: ::exr::error::Error) -> Unwritten {
+    match error {
         ::exr::error::Error::Io(error) => Unwritten::Io(error),
         error => Unwritten::Refused(error.to_string()),
-    })
+    }
 }
 
 /// Names of all channels.
@@ -135,48 +123,41 @@ pub(crate) fn decode_channels(bytes: &[u8], names: [&str; 3]) -> Result<Option<I
     };
     exr_chunks::check_blocks(header)?;
     let (display, window) = windows(header)?;
-    let width = window.width();
-    let black = move || vec![[0.0_f32; 3]; window.area()];
-    // The decoder takes no name twice.
-    let [a, b, c] = names;
-    let pixels = contained(|| {
-        let layers = read()
-            .no_deep_data()
-            .largest_resolution_level()
-            .specific_channels();
-        match a == b && b == c {
-            true => layers
-                .required(a)
-                .collect_pixels(
-                    move |_, _| black(),
-                    move |pixels: &mut Vec<_>, Vec2(x, y), (grey,): (f32,)| {
-                        pixels[y * width + x] = [grey; 3];
-                    },
-                )
-                .first_valid_layer()
-                .all_attributes()
-                .non_parallel()
-                .from_chunks(chunks)
-                .map(|file| file.layer_data.channel_data.pixels),
-            false => layers
-                .required(a)
-                .required(b)
-                .required(c)
-                .collect_pixels(
-                    move |_, _| black(),
-                    move |pixels: &mut Vec<_>, Vec2(x, y), (a, b, c): (f32, f32, f32)| {
-                        pixels[y * width + x] = [a, b, c];
-                    },
-                )
-                .first_valid_layer()
-                .all_attributes()
-                .non_parallel()
-                .from_chunks(chunks)
-                .map(|file| file.layer_data.channel_data.pixels),
-        }
-    })?;
+    let pixels = contained(|| pixels_of(chunks, names, window))?;
     let image = Image::new(display.width(), display.height(), window, pixels);
     image.map(Some).map_err(|error| error.to_string())
+}
+
+/// Pixels of the first layer that has three channels, or one that is given three times, which is grey.
+fn pixels_of(
+    chunks: block::reader::Reader<Cursor<&[u8]>>,
+    [a, b, c]: [&str; 3],
+    window: Window,
+) -> ::exr::error::Result<Vec<[f32; 3]>> {
+    let width = window.width();
+    let black = move || vec![[0.0_f32; 3]; window.area()];
+    let samples = read().no_deep_data().largest_resolution_level();
+    let samples = samples.specific_channels().required(a);
+    // The decoder takes no name twice.
+    if a == b && b == c {
+        let set = move |pixels: &mut Vec<_>, Vec2(x, y), (grey,): (f32,)| {
+            pixels[y * width + x] = [grey; 3];
+        };
+        let layers = samples.collect_pixels(move |_, _| black(), set);
+        let file = (layers.first_valid_layer().all_attributes())
+            .non_parallel()
+            .from_chunks(chunks)?;
+        return Ok(file.layer_data.channel_data.pixels);
+    }
+    let set = move |pixels: &mut Vec<_>, Vec2(x, y), (a, b, c): (f32, f32, f32)| {
+        pixels[y * width + x] = [a, b, c];
+    };
+    let samples = samples.required(b).required(c);
+    let layers = samples.collect_pixels(move |_, _| black(), set);
+    let file = (layers.first_valid_layer().all_attributes())
+        .non_parallel()
+        .from_chunks(chunks)?;
+    Ok(file.layer_data.channel_data.pixels)
 }
 
 /// Decodes the bytes of an EXR file.
@@ -189,7 +170,7 @@ pub(crate) fn decode(bytes: &[u8], claim: &mut Claim) -> Result<Image, String> {
     for header in chunks.headers() {
         exr_chunks::check_blocks(header)?;
     }
-    let (layer, colour) = choose_layer(chunks.headers())?;
+    let (layer, names) = choose_layer(chunks.headers())?;
     let header = &chunks.headers()[layer];
     let (display, window) = windows(header)?;
     let samples = header.channels.list.iter();
@@ -200,67 +181,22 @@ pub(crate) fn decode(bytes: &[u8], claim: &mut Claim) -> Result<Image, String> {
     let pixels = [window.width(), window.height()].map(|size| size as u64);
     claim.take_pixels(pixels[0], pixels[1], size_of::<[f32; 3]>() as u64)?;
     exr_chunks::check(bytes, layer)?;
-    let width = window.width();
-
-    let black = move |_: Vec2<usize>| vec![[0.0_f32; 3]; window.area()];
-    let samples = read().no_deep_data().largest_resolution_level();
-    let pixels = contained(|| match colour {
-        Colour::Rgb => samples
-            .rgb_channels(
-                move |size, _| black(size),
-                move |pixels: &mut Vec<_>, Vec2(x, y), (r, g, b): (f32, f32, f32)| {
-                    pixels[y * width + x] = [r, g, b];
-                },
-            )
-            .first_valid_layer()
-            .all_attributes()
-            .non_parallel()
-            .from_chunks(chunks)
-            .map(|file| file.layer_data.channel_data.pixels),
-        Colour::Luminance => samples
-            .specific_channels()
-            .required("Y")
-            .collect_pixels(
-                move |size, _| black(size),
-                move |pixels: &mut Vec<_>, Vec2(x, y), (luminance,): (f32,)| {
-                    pixels[y * width + x] = [luminance; 3];
-                },
-            )
-            .first_valid_layer()
-            .all_attributes()
-            .non_parallel()
-            .from_chunks(chunks)
-            .map(|file| file.layer_data.channel_data.pixels),
-    })?;
+    let pixels = contained(|| pixels_of(chunks, names, window))?;
     Image::new(display.width(), display.height(), window, pixels).map_err(|error| error.to_string())
 }
 
-/// Colour channels of a layer.
-#[derive(Clone, Copy)]
-enum Colour {
-    Rgb,
-    Luminance,
-}
-
-impl Colour {
-    fn channels(self) -> &'static [&'static str] {
-        match self {
-            Self::Rgb => &["R", "G", "B"],
-            Self::Luminance => &["Y"],
-        }
-    }
-}
+/// Channels of colours, and of luminance alone.
+const RGB: [&str; 3] = ["R", "G", "B"];
+const LUMINANCE: [&str; 3] = ["Y"; 3];
 
 /// Chooses the layer to read: the first that has the channels, as the reader of the crate `exr` does.
-fn choose_layer(headers: &[Header]) -> Result<(usize, Colour), String> {
+fn choose_layer(headers: &[Header]) -> Result<(usize, [&'static str; 3]), String> {
     let has = |header: &Header, name: &str| header.channels.list.iter().any(|c| c.name == *name);
-    let found = [Colour::Rgb, Colour::Luminance]
-        .into_iter()
-        .find_map(|colour| {
-            let complete = |header: &Header| colour.channels().iter().all(|name| has(header, name));
-            Some((headers.iter().position(complete)?, colour))
-        });
-    let Some((layer, colour)) = found else {
+    let found = [RGB, LUMINANCE].into_iter().find_map(|names| {
+        let complete = |header: &Header| names.iter().all(|name| has(header, name));
+        Some((headers.iter().position(complete)?, names))
+    });
+    let Some((layer, names)) = found else {
         let names = headers.iter().flat_map(|header| &header.channels.list);
         let names: Vec<_> = names.map(|channel| channel.name.to_string()).collect();
         let names = names.join(", ");
@@ -272,7 +208,7 @@ fn choose_layer(headers: &[Header]) -> Result<(usize, Colour), String> {
     if header.deep {
         return Err("deep data is not supported".into());
     }
-    if matches!(colour, Colour::Luminance) && (has(header, "RY") || has(header, "BY")) {
+    if names == LUMINANCE && (has(header, "RY") || has(header, "BY")) {
         return Err("colours stored as luminance and chroma are not supported".into());
     }
     if let Some(channel) = header
@@ -287,7 +223,7 @@ fn choose_layer(headers: &[Header]) -> Result<(usize, Colour), String> {
             "channel {name} is subsampled {x} x {y}, which is not supported"
         ));
     }
-    Ok((layer, colour))
+    Ok((layer, names))
 }
 
 /// Display and data window of a layer, relative to the corner of the display window.

@@ -90,16 +90,7 @@ impl Image {
     /// # Errors
     /// [`Error::Read`] or [`Error::Decode`].
     pub fn channel_names(path: impl AsRef<Path>) -> Result<Vec<String>, Error> {
-        let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|source| Error::Read {
-            path: path.to_path_buf(),
-            source,
-        })?;
-        crate::exr::channel_names(&bytes).map_err(|reason| Error::Decode {
-            path: path.to_path_buf(),
-            format: "exr",
-            reason,
-        })
+        of_exr(path.as_ref(), crate::exr::channel_names)
     }
 
     /// Reads three channels of an EXR file as an image, such as `Albedo.R`, `Albedo.G` and `Albedo.B`. One name three
@@ -108,17 +99,22 @@ impl Image {
     /// # Errors
     /// [`Error::Read`] or [`Error::Decode`].
     pub fn read_channels(path: impl AsRef<Path>, names: [&str; 3]) -> Result<Option<Self>, Error> {
-        let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|source| Error::Read {
-            path: path.to_path_buf(),
-            source,
-        })?;
-        crate::exr::decode_channels(&bytes, names).map_err(|reason| Error::Decode {
-            path: path.to_path_buf(),
-            format: "exr",
-            reason,
-        })
+        let decode = |bytes: &[u8]| crate::exr::decode_channels(bytes, names);
+        of_exr(path.as_ref(), decode)
     }
+}
+
+/// Decodes an EXR file in memory.
+fn of_exr<T>(path: &Path, decode: impl Fn(&[u8]) -> Result<T, String>) -> Result<T, Error> {
+    let bytes = std::fs::read(path).map_err(|source| Error::Read {
+        path: path.to_path_buf(),
+        source,
+    })?;
+    decode(&bytes).map_err(|reason| Error::Decode {
+        path: path.to_path_buf(),
+        format: "exr",
+        reason,
+    })
 }
 
 impl Rgb8Image {

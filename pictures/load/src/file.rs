@@ -196,14 +196,13 @@ fn extension(path: &Path) -> String {
 fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> {
     let limit = options.max_memory.bytes();
     let extension = extension(path);
+    let owned = || path.to_path_buf();
     let mut loaded = match extension.as_str() {
         // The readers of other formats take files as they are.
         "stl" | "obj" | "gltf" | "glb" | "tif" | "tiff" | "asc" | "npy"
             if decompressed(path) != path =>
         {
-            return Err(Error::Compressed {
-                path: path.to_path_buf(),
-            });
+            return Err(Error::Compressed { path: owned() });
         }
         "ply" => {
             let ply = antumbra_pbrt::load_colored_ply_within(path, limit, origin)?;
@@ -219,13 +218,11 @@ fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> 
         "gltf" | "glb" => of_model(path, load_gltf(path, limit, origin, options.looks)?),
         "tif" | "tiff" | "asc" | "npy" => terrain::load(path, stem(path), limit, origin)?,
         _ if path.is_dir() => {
-            return Err(Error::Folder {
-                path: path.to_path_buf(),
-            });
+            return Err(Error::Folder { path: owned() });
         }
         _ => {
             return Err(Error::UnknownFormat {
-                path: path.to_path_buf(),
+                path: owned(),
                 extension,
             });
         }
@@ -239,9 +236,7 @@ fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> 
             Geometry::Curves(curves) => curves.first.is_empty(),
         });
     if is_empty {
-        return Err(Error::EmptyMesh {
-            path: path.to_path_buf(),
-        });
+        return Err(Error::EmptyMesh { path: owned() });
     }
     fill_normals(&mut loaded.scene);
     if options.looks && loaded.scene.stored_shapes().all(is_invisible) {

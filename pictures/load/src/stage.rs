@@ -176,7 +176,7 @@ pub struct OwnStage {
 /// the origin.
 pub fn scene_of_mesh(name: String, mesh: TriangleMesh, material: Material) -> Scene {
     let model = Model {
-        shapes: vec![shape(mesh, 0)],
+        shapes: vec![Shape::new(Geometry::Mesh(Arc::new(mesh)), 0)],
         materials: vec![material],
         ..Model::default()
     };
@@ -346,25 +346,12 @@ pub fn set_ground(scene: &mut Scene, up: Up) {
         indices: vec![[0, 1, 2], [0, 2, 3]],
         ..TriangleMesh::default()
     };
-    scene.shapes.push(shape(mesh, scene.materials.len()));
+    let (geometry, material) = (Geometry::Mesh(Arc::new(mesh)), scene.materials.len());
+    scene.shapes.push(Shape::new(geometry, material));
     scene.materials.push(Material::Matte(Matte {
         kd: Param::Constant(GROUND_COLOR),
         sigma: 0.0.into(),
     }));
-}
-
-/// A mesh with a material.
-fn shape(mesh: TriangleMesh, material: usize) -> Shape {
-    Shape {
-        geometry: Geometry::Mesh(Arc::new(mesh)),
-        material,
-        area_light: None,
-        media: None,
-        alpha: None,
-        shadow_alpha: None,
-        reverse_orientation: false,
-        transform_swaps_handedness: false,
-    }
 }
 
 /// Moves the camera so that all vertices just fit the picture.

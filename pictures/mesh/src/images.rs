@@ -39,19 +39,10 @@ pub(crate) struct Loaded {
 }
 
 /// How a texture lies on a surface.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Laid {
     pub mapping: Mapping,
     pub wrap: Wrap,
-}
-
-impl Default for Laid {
-    fn default() -> Self {
-        Self {
-            mapping: Mapping::default(),
-            wrap: Wrap::Repeat,
-        }
-    }
 }
 
 impl Loaded {
@@ -257,9 +248,7 @@ fn decode(
             height,
             pixels,
         }),
-        encoded: !linear
-            .iter()
-            .any(|linear| extension.eq_ignore_ascii_case(linear)),
+        encoded: !(linear.iter()).any(|linear| extension.eq_ignore_ascii_case(linear)),
     })
 }
 

@@ -18,6 +18,15 @@ pub struct RasterMesh {
 /// Mark of a cell without a vertex.
 const NONE: u32 = u32::MAX;
 
+/// Vector of length 1, or 0 for none.
+fn unit(vector: [f64; 3]) -> [f32; 3] {
+    let length = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
+    match length > 0.0 {
+        true => vector.map(|x| (x / length) as f32),
+        false => [0.0; 3],
+    }
+}
+
 impl Raster {
     /// The surface of a raster of heights, with z up, measured from `origin` before it is rounded.
     ///
@@ -80,16 +89,7 @@ impl Raster {
                 }
             }
         }
-        mesh.normals = sums
-            .into_iter()
-            .map(|sum| {
-                let length = sum.iter().map(|x| x * x).sum::<f64>().sqrt();
-                match length > 0.0 {
-                    true => sum.map(|x| (x / length) as f32),
-                    false => [0.0; 3],
-                }
-            })
-            .collect();
+        mesh.normals = sums.into_iter().map(unit).collect();
         mesh
     }
 

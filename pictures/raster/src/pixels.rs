@@ -50,6 +50,22 @@ const PACKERS: [(u16, &str); 8] = [
     (3, "CCITT fax 3"),
 ];
 
+/// Size of strips or tiles, and the tags of their offsets and lengths.
+fn layout(
+    number: &mut impl FnMut(Tag, u64) -> Result<u32, String>,
+    is_tiled: bool,
+    size: [usize; 2],
+) -> Result<([usize; 2], [Tag; 2]), String> {
+    if is_tiled {
+        let [width, length] = [Tag::TileWidth, Tag::TileLength].map(|tag| number(tag, 0));
+        let chunk = [width? as usize, length? as usize];
+        return Ok((chunk, [Tag::TileOffsets, Tag::TileByteCounts]));
+    }
+    let rows = number(Tag::RowsPerStrip, u32::MAX.into())? as usize;
+    let chunk = [size[0], rows.min(size[1])];
+    Ok((chunk, [Tag::StripOffsets, Tag::StripByteCounts]))
+}
+
 impl<'a> Page<'a> {
     /// The page that a directory describes. `check` refuses sizes that there is no memory for.
     pub fn new(
@@ -91,15 +107,7 @@ impl<'a> Page<'a> {
             _ => return Err(format!("found predictor {predictor} of {bits} bits")),
         }
         let is_tiled = directory.contains(Tag::TileOffsets);
-        let (chunk, [offsets, counts]) = if is_tiled {
-            let [width, length] = [Tag::TileWidth, Tag::TileLength].map(|tag| number(tag, 0));
-            let chunk = [width? as usize, length? as usize];
-            (chunk, [Tag::TileOffsets, Tag::TileByteCounts])
-        } else {
-            let rows = number(Tag::RowsPerStrip, u32::MAX.into())? as usize;
-            let chunk = [size[0], rows.min(size[1])];
-            (chunk, [Tag::StripOffsets, Tag::StripByteCounts])
-        };
+        let (chunk, [offsets, counts]) = layout(&mut number, is_tiled, size)?;
         if chunk.contains(&0) {
             return Err("its strips or tiles have no size".into());
         }
@@ -120,12 +128,11 @@ impl<'a> Page<'a> {
             format,
         };
         let wanted = size[0].div_ceil(chunk[0]) * size[1].div_ceil(chunk[1]);
-        match [page.offsets.len(), page.counts.len()] == [wanted; 2] {
+        let [offsets, counts] = [page.offsets.len(), page.counts.len()];
+        match [offsets, counts] == [wanted; 2] {
             true => Ok(page),
             false => Err(format!(
-                "found {} offsets and {} lengths of {wanted} strips or tiles",
-                page.offsets.len(),
-                page.counts.len()
+                "found {offsets} offsets and {counts} lengths of {wanted} strips or tiles"
             )),
         }
     }

@@ -33,6 +33,20 @@ pub struct Shape {
 }
 
 impl Shape {
+    /// Shape of a geometry and a material, without light, media or masks.
+    pub fn new(geometry: Geometry, material: usize) -> Self {
+        Self {
+            geometry,
+            material,
+            area_light: None,
+            media: None,
+            alpha: None,
+            shadow_alpha: None,
+            reverse_orientation: false,
+            transform_swaps_handedness: false,
+        }
+    }
+
     /// Shape transformed by `matrix`; `None` for a sphere under a non-uniform scale.
     ///
     /// The identity shares the mesh instead of copying it. A reflection toggles [`Self::transform_swaps_handedness`],

@@ -166,9 +166,10 @@ pub enum TextureFilter {
 }
 
 /// Value outside the unit square of an image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize)]
 pub enum Wrap {
     /// The image repeats.
+    #[default]
     Repeat,
     /// The value is 0.
     Black,

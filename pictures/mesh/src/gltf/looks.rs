@@ -12,7 +12,7 @@
 
 use std::borrow::Cow;
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use antumbra_scene::material::{Glass, Metallic, Mix, NormalMapped};
@@ -46,12 +46,14 @@ pub(super) struct Looks<'a> {
     buffers: &'a [Cow<'a, [u8]>],
     /// Folder of the images; `None` if they are not wanted.
     folder: Option<&'a Path>,
-    images: Images,
-    materials: Vec<Material>,
+    pub images: Images,
+    pub materials: Vec<Material>,
     known: HashMap<(Option<usize>, bool), Look>,
-    notes: Vec<String>,
-    warnings: Vec<String>,
-    mistakes: Vec<String>,
+    pub notes: Vec<String>,
+    /// Missing images.
+    pub warnings: Vec<String>,
+    /// Damaged images.
+    pub mistakes: Vec<String>,
 }
 
 /// Coordinates of a texture: their set, and a transformation in the space of glTF.
@@ -138,29 +140,6 @@ impl<'a> Looks<'a> {
         }
     }
 
-    pub fn take_notes(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.notes)
-    }
-
-    /// Warnings so far: missing images.
-    pub fn take_warnings(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.warnings)
-    }
-
-    /// Mistakes so far: damaged images.
-    pub fn take_mistakes(&mut self) -> Vec<String> {
-        std::mem::take(&mut self.mistakes)
-    }
-
-    pub fn take_materials(&mut self) -> Vec<Material> {
-        std::mem::take(&mut self.materials)
-    }
-
-    /// Image files that were read.
-    pub fn files(&self) -> impl Iterator<Item = PathBuf> {
-        self.images.paths().cloned()
-    }
-
     fn note(&mut self, note: &str) {
         if !self.notes.iter().any(|known| known == note) {
             self.notes.push(note.to_owned());
@@ -211,14 +190,16 @@ struct Surface<'s, 'a> {
 }
 
 impl Surface<'_, '_> {
+    fn note(&mut self, note: &str) {
+        self.looks.note(note);
+    }
+
     fn look(&mut self, material: &gltf::Material, has_colors: bool) -> Look {
         let pbr = material.pbr_metallic_roughness();
         let [r, g, b, opacity] = pbr.base_color_factor();
         let mut factor = Rgb::new(r, g, b).clamp(Rgb::ZERO, Rgb::ONE);
         let base = pbr.base_color_texture();
-        let texture = base
-            .as_ref()
-            .and_then(|info| self.info(info, Channel::Color));
+        let texture = (base.as_ref()).and_then(|info| self.info(info, Channel::Color));
         if base.is_some() && texture.is_none() {
             factor *= PLAIN_GREY;
         }
@@ -238,8 +219,7 @@ impl Surface<'_, '_> {
         };
         let made = self.normal_mapped(material, made);
         if material.occlusion_texture().is_some() {
-            self.looks
-                .note("occlusion textures are left out: light is traced");
+            self.note("occlusion textures are left out: light is traced");
         }
         let emission = self.emission(material);
         let (alpha, is_invisible) = self.alpha(material, opacity);
@@ -256,69 +236,58 @@ impl Surface<'_, '_> {
     fn material(&mut self, material: &gltf::Material, color: Param<Rgb>) -> Material {
         let pbr = material.pbr_metallic_roughness();
         let both = pbr.metallic_roughness_texture();
-        let mut channel = |index: u8, factor: f32| {
-            let found = both
-                .as_ref()
-                .and_then(|info| self.info(info, Channel::One(index)));
-            match found {
-                Some((loaded, laid)) => loaded.number(laid, factor),
-                None => Param::Constant(factor),
-            }
-        };
-        let roughness = channel(1, pbr.roughness_factor());
-        let metallic = channel(2, pbr.metallic_factor());
-        let mut opaque = Material::Metallic(Metallic {
+        let roughness = self.number(both.as_ref(), 1, pbr.roughness_factor());
+        let opaque = Metallic {
             color: color.clone(),
-            metallic,
+            metallic: self.number(both.as_ref(), 2, pbr.metallic_factor()),
             roughness: roughness.clone(),
             coat: self.coat(material).into(),
             transmission: 0.0.into(),
-        });
+        };
         let Some(clear) = material.transmission() else {
-            return opaque;
+            return opaque.into();
         };
-        let factor = clear.transmission_factor();
-        let texture = clear.transmission_texture();
-        let texture = texture.and_then(|info| self.info(&info, Channel::One(0)));
-        let share = match texture {
-            Some((loaded, laid)) => loaded.number(laid, factor),
-            None => Param::Constant(factor),
-        };
+        let (texture, factor) = (clear.transmission_texture(), clear.transmission_factor());
+        let share = self.number(texture.as_ref(), 0, factor);
         if share.constant() == Some(&0.0) {
-            return opaque;
+            return opaque.into();
         }
-        let volume = material
-            .volume()
-            .filter(|volume| volume.thickness_factor() > 0.0);
+        let volume = (material.volume()).filter(|volume| volume.thickness_factor() > 0.0);
         let Some(volume) = volume else {
             if roughness.constant() != Some(&0.0) {
-                self.looks.note(
+                self.note(
                     "light that passes through thin sheets is not blurred by their roughness",
                 );
             }
-            if let Material::Metallic(Metallic { transmission, .. }) = &mut opaque {
-                *transmission = share;
-            }
-            return opaque;
+            return Material::Metallic(Metallic {
+                transmission: share,
+                ..opaque
+            });
         };
         if volume.attenuation_color() != [1.0; 3] && volume.attenuation_distance().is_finite() {
-            self.looks
-                .note("attenuation inside volumes is left out: only the base colour tints glass");
+            self.note("attenuation inside volumes is left out: only the base colour tints glass");
         }
         let glass = glass(color, &roughness, material.ior().unwrap_or(1.5));
         let share = match share {
             Param::Constant(share) if share >= 1.0 => return glass,
             Param::Constant(share) => share,
             Param::Texture(_) => {
-                self.looks
-                    .note("textures of transmission are left out where there is a volume");
+                self.note("textures of transmission are left out where there is a volume");
                 factor
             }
         };
         Material::Mix(Mix {
-            materials: [Arc::new(glass), Arc::new(opaque)],
+            materials: [Arc::new(glass), Arc::new(opaque.into())],
             amount: Rgb::splat(share).into(),
         })
+    }
+
+    /// Factor times a channel of a texture, if there is one.
+    fn number(&mut self, info: Option<&Info>, channel: u8, factor: f32) -> Param<f32> {
+        match info.and_then(|info| self.info(info, Channel::One(channel))) {
+            Some((loaded, laid)) => loaded.number(laid, factor),
+            None => Param::Constant(factor),
+        }
     }
 
     /// Reflectance of the surface of a dielectric at normal incidence.
@@ -333,8 +302,7 @@ impl Surface<'_, '_> {
             return coat;
         };
         if specular.specular_texture().is_some() || specular.specular_color_texture().is_some() {
-            self.looks
-                .note("textures of KHR_materials_specular are left out");
+            self.note("textures of KHR_materials_specular are left out");
         }
         (coat * Rgb::from(specular.specular_color_factor())).min(Rgb::ONE)
             * specular.specular_factor()
@@ -420,12 +388,12 @@ impl Surface<'_, '_> {
         let folder = self.looks.folder?;
         let set = *self.uv_set.get_or_insert(coordinates.set);
         if set != coordinates.set {
-            self.looks.note(
+            self.note(
                 "textures of one material that use several sets of coordinates all use the first",
             );
         }
         let Some(image) = texture.source() else {
-            self.looks.note("textures without an image are left out");
+            self.note("textures without an image are left out");
             return None;
         };
         let sampler = texture.sampler();
@@ -433,13 +401,12 @@ impl Surface<'_, '_> {
             WrappingMode::ClampToEdge => Wrap::Clamp,
             WrappingMode::Repeat => Wrap::Repeat,
             WrappingMode::MirroredRepeat => {
-                self.looks.note("mirrored textures are repeated instead");
+                self.note("mirrored textures are repeated instead");
                 Wrap::Repeat
             }
         };
         if sampler.wrap_s() != sampler.wrap_t() {
-            self.looks
-                .note("textures that continue differently along u and v use the rule of u");
+            self.note("textures that continue differently along u and v use the rule of u");
         }
         let laid = Laid {
             mapping: coordinates.mapping(),

@@ -103,22 +103,29 @@ impl<'a> Reader<'a> {
             self.keeps_invisible = true;
             self.place(&placed);
         }
-        self.mistakes.extend(self.looks.take_mistakes());
-        if !self.mistakes.is_empty() {
-            return Err(self.mistakes);
+        let wants_looks = self.wants_looks;
+        let Self {
+            looks,
+            mut model,
+            mut mistakes,
+            ..
+        } = self;
+        mistakes.extend(looks.mistakes);
+        if !mistakes.is_empty() {
+            return Err(mistakes);
         }
-        let notes = self.looks.take_notes();
-        for note in notes {
-            self.look_note(&note);
+        for note in looks.notes.iter().filter(|_| wants_looks) {
+            model.note(note);
         }
-        let warnings = self.looks.take_warnings().into_iter();
-        self.model.warnings.extend(warnings.map(|text| Warning {
-            place: String::new(),
-            text,
-        }));
-        self.model.materials = self.looks.take_materials();
-        self.model.files.extend(self.looks.files());
-        Ok(self.model)
+        model
+            .warnings
+            .extend(looks.warnings.into_iter().map(|text| Warning {
+                place: String::new(),
+                text,
+            }));
+        model.materials = looks.materials;
+        model.files.extend(looks.images.paths().cloned());
+        Ok(model)
     }
 
     /// Adds shapes, objects and instances of all meshes.
@@ -311,14 +318,9 @@ impl<'a> Reader<'a> {
                         triangles: mesh.indices.len(),
                     };
                     let shape = Shape {
-                        geometry: Geometry::Mesh(Arc::new(mesh)),
-                        material: look.material,
                         area_light: look.emission.clone(),
-                        media: None,
                         alpha,
-                        shadow_alpha: None,
-                        reverse_orientation: false,
-                        transform_swaps_handedness: false,
+                        ..Shape::new(Geometry::Mesh(Arc::new(mesh)), look.material)
                     };
                     shapes.push((shape, part, is_placed));
                 }
@@ -343,10 +345,8 @@ impl<'a> Reader<'a> {
         pose: &Pose<'a>,
         own_weights: &[f32],
     ) -> Result<Option<(TriangleMesh, bool)>, String> {
-        if !matches!(
-            primitive.mode(),
-            Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan
-        ) {
+        use Mode::{TriangleFan, TriangleStrip, Triangles};
+        if !matches!(primitive.mode(), Triangles | TriangleStrip | TriangleFan) {
             self.note("points and lines are left out");
             return Ok(None);
         }
@@ -361,34 +361,14 @@ impl<'a> Reader<'a> {
         let mut positions: Vec<DVec3> =
             self.elements(&position, Dimensions::Vec3, Numbers::Quantized, DVec3::from)?;
         let vertices = positions.len();
-        let corners: Vec<u32> = match primitive.indices() {
-            None => (0..u32::try_from(vertices).map_err(|_| "too many vertices")?).collect(),
-            Some(indices) => {
-                self.elements(&indices, Dimensions::Scalar, Numbers::Whole, |[i]| i as u32)?
-            }
-        };
-        // A corner takes an index, and in a strip a triangle as well.
-        self.take_memory(corners.len() as u64 * 12)?;
-        if let Some(&corner) = corners.iter().find(|&&corner| corner as usize >= vertices) {
-            return Err(format!(
-                "vertex {corner} is used, but there are only {vertices} vertices"
-            ));
-        }
+        let corners = self.corners(primitive, vertices)?;
         let normal = Semantic::Normals;
         let mut normals = self.attribute(primitive, &normal, Dimensions::Vec3, Vec3::from)?;
         // The origin of glTF is the upper left corner of an image, that of scenes the lower left.
         let upright = |[u, v]: [f32; 2]| Vec2::new(u, 1.0 - v);
         let uv = Semantic::TexCoords(set);
         let uvs = self.attribute(primitive, &uv, Dimensions::Vec2, upright)?;
-        let color = Semantic::Colors(0);
-        let colors = match primitive.get(&color).map(|color| color.dimensions()) {
-            Some(Dimensions::Vec4) => {
-                self.look_note("the alpha of vertex colours is left out");
-                let opaque = |[r, g, b, _]: [f32; 4]| Rgb::new(r, g, b);
-                self.attribute(primitive, &color, Dimensions::Vec4, opaque)?
-            }
-            _ => self.attribute(primitive, &color, Dimensions::Vec3, Rgb::from)?,
-        };
+        let colors = self.colors(primitive)?;
         for (what, count) in [
             ("normals", normals.len()),
             ("texture coordinates", uvs.len()),
@@ -405,16 +385,44 @@ impl<'a> Reader<'a> {
         let is_placed = !pose.joints.is_empty()
             && self.skin(primitive, &pose.joints, &mut positions, &mut normals)?;
         let mesh = TriangleMesh {
-            positions: positions
-                .iter()
-                .map(|position| position.as_vec3().into())
-                .collect(),
+            positions: positions.iter().map(|at| at.as_vec3().into()).collect(),
             indices: triangles(primitive.mode(), &corners),
             normals: normals.into_iter().map(Vec3::normalize_or_zero).collect(),
             uvs,
             colors,
         };
         Ok(Some((mesh, is_placed)))
+    }
+
+    /// Vertices of the corners of a primitive, one after another if it names none.
+    fn corners(&mut self, primitive: &Primitive, vertices: usize) -> Result<Vec<u32>, String> {
+        let corners: Vec<u32> = match primitive.indices() {
+            None => (0..u32::try_from(vertices).map_err(|_| "too many vertices")?).collect(),
+            Some(indices) => {
+                self.elements(&indices, Dimensions::Scalar, Numbers::Whole, |[i]| i as u32)?
+            }
+        };
+        // A corner takes an index, and in a strip a triangle as well.
+        self.take_memory(corners.len() as u64 * 12)?;
+        match corners.iter().find(|&&corner| corner as usize >= vertices) {
+            None => Ok(corners),
+            Some(corner) => Err(format!(
+                "vertex {corner} is used, but there are only {vertices} vertices"
+            )),
+        }
+    }
+
+    /// Colours of the vertices of a primitive, which may have none.
+    fn colors(&mut self, primitive: &Primitive) -> Result<Vec<Rgb>, String> {
+        let color = Semantic::Colors(0);
+        match primitive.get(&color).map(|color| color.dimensions()) {
+            Some(Dimensions::Vec4) => {
+                self.look_note("the alpha of vertex colours is left out");
+                let opaque = |[r, g, b, _]: [f32; 4]| Rgb::new(r, g, b);
+                self.attribute(primitive, &color, Dimensions::Vec4, opaque)
+            }
+            _ => self.attribute(primitive, &color, Dimensions::Vec3, Rgb::from),
+        }
     }
 
     /// Reads an attribute of a primitive, which may have none.

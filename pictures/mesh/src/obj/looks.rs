@@ -215,9 +215,9 @@ impl Maps<'_> {
         let ks = ks.clamp(Rgb::ZERO, Rgb::ONE);
         match kind {
             Kind::Physical => {
-                let roughness =
-                    self.number(mtl.map_roughness.as_ref(), mtl.roughness.unwrap_or(1.0));
-                let metallic = self.number(mtl.map_metallic.as_ref(), mtl.metallic.unwrap_or(1.0));
+                let factors = [mtl.roughness, mtl.metallic].map(|factor| factor.unwrap_or(1.0));
+                let roughness = self.number(mtl.map_roughness.as_ref(), factors[0]);
+                let metallic = self.number(mtl.map_metallic.as_ref(), factors[1]);
                 let eta = mtl.ni.filter(|&eta| eta > 1.0).unwrap_or(1.5);
                 let coat = (eta - 1.0) / (eta + 1.0);
                 Material::Metallic(Metallic {

@@ -237,14 +237,9 @@ impl Reader<'_> {
             let material = model.materials.len();
             model.materials.push(looks.material);
             model.shapes.push(Shape {
-                geometry: Geometry::Mesh(Arc::new(lists.mesh(&part))),
-                material,
                 area_light: looks.emission,
-                media: None,
                 alpha: looks.alpha.filter(|_| opaque.is_none()),
-                shadow_alpha: None,
-                reverse_orientation: false,
-                transform_swaps_handedness: false,
+                ..Shape::new(Geometry::Mesh(Arc::new(lists.mesh(&part))), material)
             });
         }
         model.files.extend(images.paths().cloned());

@@ -274,10 +274,8 @@ impl Statement<'_> {
             self.leave_out(self.place.2, "the name of an image is needed here");
             return None;
         };
-        let names: Vec<_> = words
-            .iter()
-            .map(|(_, w)| String::from_utf8_lossy(w))
-            .collect();
+        let names = words.iter().map(|(_, w)| String::from_utf8_lossy(w));
+        let names: Vec<_> = names.collect();
         map.name = names.join(" ");
         map.column = column;
         let folder = library.parent().unwrap_or(Path::new(""));

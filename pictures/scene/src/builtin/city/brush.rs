@@ -93,16 +93,7 @@ impl Brushes {
         used.filter(|(_, mesh)| !mesh.indices.is_empty())
             .enumerate()
             .map(|(material, (paint, mesh))| {
-                let shape = Shape {
-                    geometry: Geometry::Mesh(Arc::new(mesh)),
-                    material,
-                    area_light: None,
-                    media: None,
-                    alpha: None,
-                    shadow_alpha: None,
-                    reverse_orientation: false,
-                    transform_swaps_handedness: false,
-                };
+                let shape = Shape::new(Geometry::Mesh(Arc::new(mesh)), material);
                 (shape, paint.material())
             })
             .unzip()
