@@ -3,7 +3,7 @@
 use crate::directive::{ActiveTransform, Quoted};
 use crate::lexer::{Lexer, Token, TokenKind, unquote};
 use crate::number::parse_float;
-use crate::params::{self, Outcome, Params, shorten};
+use crate::params::{self, Params, shorten};
 use crate::report::Report;
 
 /// Failure that was reported. The rest of the directive is to be skipped.
@@ -49,10 +49,7 @@ impl Argument for Option<Quoted> {
 
 impl Argument for Params {
     fn read(from: &mut Arguments) -> Result<Self, Failed> {
-        match params::parse(from.lexer, from.report) {
-            Outcome::Complete(params) => Ok(params),
-            Outcome::Failed => Err(Failed),
-        }
+        params::parse(from.lexer, from.report).ok_or(Failed)
     }
 
     fn params_mut(&mut self) -> Option<&mut Params> {

@@ -54,11 +54,9 @@ impl Tables {
 
 /// Reads a file in memory.
 fn parse(name: &str, bytes: &[u8]) -> Result<FourierTable, String> {
+    let found = bytes.len();
     let Some((head, mut rest)) = bytes.split_at_checked(HEAD) else {
-        return Err(format!(
-            "the file has {} bytes, too few for its head",
-            bytes.len()
-        ));
+        return Err(format!("the file has {found} bytes, too few for its head"));
     };
     if head[..8] != *b"SCATFUN\x01" {
         return Err("the file does not begin as a table of scattering".into());
@@ -88,8 +86,7 @@ fn parse(name: &str, bytes: &[u8]) -> Result<FourierTable, String> {
     // What follows says how the table was made.
     if expected.is_none_or(|expected| expected > rest.len() as u64) {
         return Err(format!(
-            "the file has {} bytes, too few for {cosines} cosines and {coefficients} coefficients",
-            bytes.len()
+            "the file has {found} bytes, too few for {cosines} cosines and {coefficients} coefficients"
         ));
     }
     let mut words = |count: u64| -> Vec<[u8; 4]> {

@@ -36,13 +36,10 @@ impl Budget {
         }
         if !report.is_over() {
             let limit = self.limit;
-            report.error_help(
-                at,
-                format!(
-                    "from here on the scene needs more memory than is allowed: {taken} bytes of {limit}"
-                ),
-                "allow more memory, or leave something out",
+            let message = format!(
+                "from here on the scene needs more memory than is allowed: {taken} bytes of {limit}"
             );
+            report.error_help(at, message, "allow more memory, or leave something out");
             report.end();
         }
         false

@@ -138,22 +138,7 @@ impl<'o> Builder<'o> {
         if !report.is_over() {
             self.define_textures(report);
         }
-        match self.phase {
-            // The rest of the file was not read.
-            _ if report.is_over() => {}
-            Phase::Options => report.error_help(
-                end,
-                "the file has no WorldBegin",
-                "shapes and lights stand between WorldBegin and WorldEnd",
-            ),
-            // Version 4 has no such directive.
-            Phase::World if self.is_version4 => self.world_end(report),
-            Phase::World => {
-                report.error(end, "the file ends without WorldEnd");
-                self.report_open_blocks(report);
-            }
-            Phase::Done => {}
-        }
+        self.end(end, report);
         self.drop_unused_objects();
         for path in self.images.paths() {
             report.sources.note(path.clone());
@@ -207,6 +192,59 @@ impl<'o> Builder<'o> {
 }
 
 impl Builder<'_> {
+    /// Ends the world, or reports that the file ends too early.
+    fn end(&mut self, end: Span, report: &mut Report) {
+        match self.phase {
+            // The rest of the file was not read.
+            _ if report.is_over() => {}
+            Phase::Options => report.error_help(
+                end,
+                "the file has no WorldBegin",
+                "shapes and lights stand between WorldBegin and WorldEnd",
+            ),
+            // Version 4 has no such directive.
+            Phase::World if self.is_version4 => self.world_end(report),
+            Phase::World => {
+                report.error(end, "the file ends without WorldEnd");
+                self.report_open_blocks(report);
+            }
+            Phase::Done => {}
+        }
+    }
+
+    /// Takes what is set once for a picture, beside the camera.
+    fn setting(&mut self, at: Span, directive: Directive, report: &mut Report) {
+        use Directive as D;
+        match directive {
+            D::Film(kind, params) => {
+                (self.film, self.film_diagonal) =
+                    read("film", at, (&kind, &params), report, film::film);
+            }
+            D::PixelFilter(kind, params) => {
+                self.filter = read("pixel filter", at, (&kind, &params), report, film::filter);
+            }
+            D::Sampler(kind, params) => {
+                self.sampler = read("sampler", at, (&kind, &params), report, settings::sampler);
+            }
+            D::Integrator(kind, params) => {
+                self.integrator = read(
+                    "integrator",
+                    at,
+                    (&kind, &params),
+                    report,
+                    settings::integrator,
+                );
+            }
+            D::Accelerator(kind, params) => {
+                let orders = self.options.orders;
+                self.accelerator = read("accelerator", at, (&kind, &params), report, |lookup| {
+                    settings::accelerator(lookup, orders)
+                });
+            }
+            _ => {}
+        }
+    }
+
     /// Translates a directive of pbrt-v4, and defines the textures before it. False: it is not allowed here, which was
     /// reported.
     fn prepare(&mut self, at: Span, directive: &mut Directive, report: &mut Report) -> bool {
@@ -246,31 +284,11 @@ impl Handler for Builder<'_> {
             D::ActiveTransform(active) => self.transforms().active = active,
             D::TransformTimes(times) => self.transform_times(at, times, report),
             D::Camera(kind, params) => self.camera(at, &kind, &params, report),
-            D::Film(kind, params) => {
-                (self.film, self.film_diagonal) =
-                    read("film", at, (&kind, &params), report, film::film);
-            }
-            D::PixelFilter(kind, params) => {
-                self.filter = read("pixel filter", at, (&kind, &params), report, film::filter);
-            }
-            D::Sampler(kind, params) => {
-                self.sampler = read("sampler", at, (&kind, &params), report, settings::sampler);
-            }
-            D::Integrator(kind, params) => {
-                self.integrator = read(
-                    "integrator",
-                    at,
-                    (&kind, &params),
-                    report,
-                    settings::integrator,
-                );
-            }
-            D::Accelerator(kind, params) => {
-                let orders = self.options.orders;
-                self.accelerator = read("accelerator", at, (&kind, &params), report, |lookup| {
-                    settings::accelerator(lookup, orders)
-                });
-            }
+            D::Film(..)
+            | D::PixelFilter(..)
+            | D::Sampler(..)
+            | D::Integrator(..)
+            | D::Accelerator(..) => self.setting(at, directive, report),
             D::WorldBegin() => self.world_begin(),
             D::WorldEnd() => self.world_end(report),
             D::AttributeBegin() => self.begin_block(BlockKind::Attribute, at, report),

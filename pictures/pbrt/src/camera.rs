@@ -118,10 +118,8 @@ fn world_from_camera_of(
             "the camera to world transformation in force here cannot be used in single precision: its \
              determinant is {determinant}"
         );
-        lookup.error_help(
-            message,
-            "the factors of a Scale must not be so small or so large",
-        );
+        let help = "the factors of a Scale must not be so small or so large";
+        lookup.error_help(message, help);
     }
     (matrix, world_from_camera)
 }

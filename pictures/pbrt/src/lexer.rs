@@ -255,11 +255,8 @@ pub(crate) fn check_utf8(report: &mut Report, file: u32) {
                 len: chunk.invalid().len() as u32,
                 line,
             };
-            report.error_help(
-                span,
-                format!("byte 0x{:02X} is not UTF-8", chunk.invalid()[0]),
-                "save the file as UTF-8",
-            );
+            let message = format!("byte 0x{:02X} is not UTF-8", chunk.invalid()[0]);
+            report.error_help(span, message, "save the file as UTF-8");
         }
         offset += chunk.invalid().len();
     }

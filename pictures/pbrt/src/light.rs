@@ -154,10 +154,9 @@ fn infinite(lookup: &mut Lookup, to_world: &DMat4, images: &mut Images) -> Optio
     }
     let radiance = scaled(lookup, "L");
     let samples = samples(lookup);
-    let environment = match map_name(lookup, images) {
-        Map::None => None,
-        Map::Broken => return None,
-        Map::Image(image) => Some(Environment {
+    let environment = match map(lookup, images)? {
+        None => None,
+        Some(image) => Some(Environment {
             image,
             mapping: EnvironmentMapping::LongitudeLatitude,
             world_from_light: rotation(to_world, lookup)?,
@@ -195,10 +194,9 @@ fn infinite4(lookup: &mut Lookup, to_world: &DMat4, images: &mut Images) -> Opti
     let image = images.of(lookup, "filename")?;
     if image.width != image.height {
         let (width, height) = (image.width, image.height);
-        return lookup.fail_help(
-            format!("the image of an infinite light has {width} x {height} pixels"),
-            "pbrt-v4 takes a square image of an octahedron; imgtool makeequiarea of pbrt-v4 makes one",
-        );
+        let message = format!("the image of an infinite light has {width} x {height} pixels");
+        let help = "pbrt-v4 takes a square image of an octahedron; imgtool makeequiarea of pbrt-v4 makes one";
+        return lookup.fail_help(message, help);
     }
     let environment = Environment {
         image,
@@ -215,55 +213,33 @@ fn goniometric(lookup: &mut Lookup, to_world: &DMat4, images: &mut Images) -> Op
         lookup.ignore_all();
         return lookup.refuse(feature);
     }
-    let map = map_name(lookup, images);
+    let map = map(lookup, images);
     check_affine(lookup, to_world)?;
     Some(Light::Goniometric {
         world_from_light: to_world.as_mat4(),
         intensity,
-        image: map.image()?,
+        image: map?,
     })
 }
 
 fn projection(lookup: &mut Lookup, to_world: &DMat4, images: &mut Images) -> Option<Light> {
     let intensity = scaled(lookup, "I");
     let fov = lookup.float_in("fov", 45.0, [f32::MIN_POSITIVE, 179.9]);
-    let map = map_name(lookup, images);
+    let map = map(lookup, images);
     check_affine(lookup, to_world)?;
     Some(Light::Projection {
         world_from_light: to_world.as_mat4(),
         intensity,
         fov,
-        image: map.image()?,
+        image: map?,
     })
 }
 
-/// Value of "mapname".
-enum Map {
-    None,
-    Image(Arc<Image>),
-    /// A mistake was reported.
-    Broken,
-}
-
-impl Map {
-    /// Image, if there is one. Outer `None`: a mistake was reported.
-    fn image(self) -> Option<Option<Arc<Image>>> {
-        match self {
-            Self::None => Some(None),
-            Self::Image(image) => Some(Some(image)),
-            Self::Broken => None,
-        }
-    }
-}
-
-/// Image of "mapname". An empty name means no image, as in pbrt-v3.
-fn map_name(lookup: &mut Lookup, images: &mut Images) -> Map {
+/// Image of "mapname". An empty name means no image, as in pbrt-v3. Outer `None`: a mistake was reported.
+fn map(lookup: &mut Lookup, images: &mut Images) -> Option<Option<Arc<Image>>> {
     match lookup.string("mapname") {
-        None | Some(("", _)) => Map::None,
-        Some(_) => match images.of(lookup, "mapname") {
-            Some(image) => Map::Image(image),
-            None => Map::Broken,
-        },
+        None | Some(("", _)) => Some(None),
+        Some(_) => images.of(lookup, "mapname").map(Some),
     }
 }
 

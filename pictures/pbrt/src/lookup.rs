@@ -237,10 +237,8 @@ impl<'a> Lookup<'a> {
                 return Some(value);
             }
             let range = range_text(low, high);
-            report.fail(
-                param.value,
-                format!("{name:?} must be {range}, found {value}"),
-            )
+            let message = format!("{name:?} must be {range}, found {value}");
+            report.fail(param.value, message)
         };
         self.value(name, FLOAT, read).unwrap_or(default)
     }
@@ -271,10 +269,8 @@ impl<'a> Lookup<'a> {
                 Ok(value) if value > most => format!("at most {most}"),
                 _ => format!("at least {least}"),
             };
-            report.fail(
-                param.value,
-                format!("{name:?} must be {limit}, found {value}"),
-            )
+            let message = format!("{name:?} must be {limit}, found {value}");
+            report.fail(param.value, message)
         };
         self.value(name, INTEGER, read).unwrap_or(default)
     }
@@ -378,10 +374,8 @@ fn one<'a, T>(param: &Param, values: Option<&'a [T]>, report: &mut Report) -> Op
         [value] => Some(value),
         values => {
             let (name, found) = (&param.name, values.len());
-            report.fail(
-                param.list,
-                format!("{name:?} takes one value, found {found}"),
-            )
+            let message = format!("{name:?} takes one value, found {found}");
+            report.fail(param.list, message)
         }
     }
 }

@@ -4,8 +4,8 @@ use antumbra_scene::{DensityGrid, Medium, Rgb};
 use glam::{DMat4, DVec3};
 
 use crate::lookup::{FLOAT, Lookup, NOT_NEGATIVE};
-use crate::presets::{self, Coefficients};
-use crate::{suggest, transform};
+use crate::presets;
+use crate::transform;
 
 /// Supported media.
 pub(crate) const SUPPORTED: &[&str] = &["heterogeneous", "homogeneous"];
@@ -24,10 +24,11 @@ pub(crate) fn read(lookup: &mut Lookup, world_from_medium: &DMat4) -> Option<Med
 
 fn of_type(lookup: &mut Lookup, world_from_medium: &DMat4) -> Option<Medium> {
     let (kind, kind_span) = lookup.needed_string("type")?;
-    let Coefficients {
-        absorption,
-        scattering,
-    } = coefficients(lookup, "sigma_s");
+    let found = presets::named(lookup, "preset", "preset").unwrap_or(presets::DEFAULT);
+    let scale = lookup.float_in("scale", 1.0, NOT_NEGATIVE);
+    let mut color = |name, default: Rgb| lookup.color(name, default) * scale;
+    let absorption = color("sigma_a", found.absorption);
+    let scattering = color("sigma_s", found.scattering);
     let asymmetry = lookup.float("g", 0.0);
     if !(asymmetry > -1.0 && asymmetry < 1.0) {
         return lookup.fail(format!("\"g\" must be between -1 and 1, found {asymmetry}"));
@@ -46,30 +47,6 @@ fn of_type(lookup: &mut Lookup, world_from_medium: &DMat4) -> Option<Medium> {
         asymmetry,
         density,
     })
-}
-
-/// Absorption "sigma_a" and scattering of the given name, by "preset" where they are not given, times "scale".
-pub(crate) fn coefficients(lookup: &mut Lookup, scattering: &'static str) -> Coefficients {
-    let mut found = presets::DEFAULT;
-    if let Some((name, span)) = lookup.string("preset")
-        && !name.is_empty()
-    {
-        match presets::by_name(name) {
-            Some(preset) => found = preset,
-            None => lookup.report.tolerated(
-                span,
-                format!("no preset is named {name:?}"),
-                "the coefficients of whole milk are taken",
-                || suggest::help(name, &presets::names()),
-            ),
-        }
-    }
-    let scale = lookup.float_in("scale", 1.0, NOT_NEGATIVE);
-    let mut color = |name, default: Rgb| lookup.color(name, default) * scale;
-    Coefficients {
-        absorption: color("sigma_a", found.absorption),
-        scattering: color(scattering, found.scattering),
-    }
 }
 
 /// Density on a grid in the box from "p0" to "p1". `None`: a mistake was reported.
@@ -98,10 +75,9 @@ fn grid(lookup: &mut Lookup, world_from_medium: &DMat4) -> Option<DensityGrid> {
     let box_from_grid = DMat4::from_translation(p0) * DMat4::from_scale(p1 - p0);
     let world_from_grid = (*world_from_medium * box_from_grid).as_mat4();
     if !transform::is_invertible(&world_from_grid.as_dmat4()) {
-        return lookup.fail_help(
-            "the box of the medium is empty, or the current transformation cannot be inverted",
-            "\"p0\" and \"p1\" must differ in every coordinate",
-        );
+        let message =
+            "the box of the medium is empty, or the current transformation cannot be inverted";
+        return lookup.fail_help(message, "\"p0\" and \"p1\" must differ in every coordinate");
     }
     Some(DensityGrid {
         size,

@@ -178,31 +178,23 @@ pub(crate) struct Params {
     pub list: Vec<Param>,
 }
 
-/// Result of reading a parameter list.
-pub(crate) enum Outcome {
-    Complete(Params),
-    /// A mistake was reported. The parser continues at the next directive.
-    Failed,
-}
-
 /// Largest number of parameters of a directive, several times more than any directive knows.
 const MAX_PARAMS: usize = 500;
 
-/// Reads parameters up to the first token that does not begin a parameter.
-pub(crate) fn parse(lexer: &mut Lexer, report: &mut Report) -> Outcome {
+/// Reads parameters up to the first token that does not begin a parameter. `None`: a mistake was reported, and the parser continues
+/// at the next directive.
+pub(crate) fn parse(lexer: &mut Lexer, report: &mut Report) -> Option<Params> {
     let mut params = Params::default();
     while let Some(token) = lexer.peek(report) {
         match token.kind {
             TokenKind::Text => {}
-            TokenKind::Broken => return Outcome::Failed,
+            TokenKind::Broken => return None,
             _ => break,
         }
         lexer.next(report);
         let declared = declaration(lexer.slice(token), token.span, report);
         let wanted = declared.as_ref().map(|(param_type, _)| *param_type);
-        let Some((values, list, value)) = read_values(lexer, report, token, wanted) else {
-            return Outcome::Failed;
-        };
+        let (values, list, value) = read_values(lexer, report, token, wanted)?;
         if let Some((param_type, name)) = declared {
             params.add(
                 Param {
@@ -218,7 +210,7 @@ pub(crate) fn parse(lexer: &mut Lexer, report: &mut Report) -> Outcome {
             );
         }
     }
-    Outcome::Complete(params)
+    Some(params)
 }
 
 impl Params {
@@ -247,10 +239,8 @@ impl Params {
     fn add(&mut self, param: Param, report: &mut Report) {
         let is_same = |p: &Param| p.name == param.name && p.param_type == param.param_type;
         if let Some(index) = self.list.iter().position(is_same) {
-            report.note(
-                param.declaration,
-                format!("parameter {:?} is given twice, the last counts", param.name),
-            );
+            let message = format!("parameter {:?} is given twice, the last counts", param.name);
+            report.note(param.declaration, message);
             self.list[index] = param;
         } else if self.list.len() == MAX_PARAMS {
             let message = format!("the directive has more than {MAX_PARAMS} parameters");
@@ -266,22 +256,17 @@ fn declaration(quoted: &[u8], span: Span, report: &mut Report) -> Option<(ParamT
     let text = unquote(quoted, span, report);
     let mut words = text.split_ascii_whitespace();
     let (Some(type_name), Some(name), None) = (words.next(), words.next(), words.next()) else {
-        report.error_help(
-            span,
-            format!("{text:?} does not declare a parameter"),
-            "write a type and a name, as in \"float fov\"",
-        );
+        let message = format!("{text:?} does not declare a parameter");
+        let help = "write a type and a name, as in \"float fov\"";
+        report.error_help(span, message, help);
         return None;
     };
     match TYPE_NAMES.iter().find(|(known, _)| *known == type_name) {
         Some((_, param_type)) => Some((*param_type, name.to_owned())),
         None => {
             let known: Vec<&str> = TYPE_NAMES.iter().map(|(name, _)| *name).collect();
-            report.error_help(
-                span,
-                format!("unknown parameter type {type_name:?}"),
-                suggest::help(type_name, &known),
-            );
+            let message = format!("unknown parameter type {type_name:?}");
+            report.error_help(span, message, suggest::help(type_name, &known));
             None
         }
     }
@@ -297,12 +282,8 @@ fn read_values(
     wanted: Option<ParamType>,
 ) -> Option<(Values, Span, Span)> {
     let missing = |report: &mut Report| {
-        report.error_help(
-            declaration.span,
-            "the parameter has no value",
-            "give one value, or several in [ ]",
-        );
-        None
+        let help = "give one value, or several in [ ]";
+        report.fail_help(declaration.span, "the parameter has no value", help)
     };
     let Some(first) = lexer.peek(report) else {
         return missing(report);
@@ -324,32 +305,7 @@ fn read_values(
             {
                 value = token.span;
             }
-            loop {
-                let token = lexer.peek(report);
-                let is_end = token.is_none_or(|t| {
-                    t.kind == TokenKind::Word
-                        && lexer.slice(t)[0].is_ascii_uppercase()
-                        && is_directive(lexer.slice(t))
-                });
-                match token {
-                    Some(token) if !is_end => {
-                        lexer.next(report);
-                        match token.kind {
-                            TokenKind::Close => break,
-                            TokenKind::Broken => return None,
-                            TokenKind::Open => {
-                                report.error(token.span, "lists do not nest: [ within [ ]");
-                                reader.values = Values::Broken;
-                            }
-                            _ => reader.read(lexer, token, report),
-                        }
-                    }
-                    _ => {
-                        report.error_help(first.span, "the list is not closed", "close it with ]");
-                        return None;
-                    }
-                }
-            }
+            reader.read_list(lexer, first, report)?;
         }
     }
     reader.check_group(first.span, report);
@@ -377,6 +333,30 @@ impl ValueReader {
             Some(_) => Values::Floats(Vec::new()),
         };
         Self { wanted, values }
+    }
+
+    /// Reads values to the end of a list. `None`: the list is broken, which was reported.
+    fn read_list(&mut self, lexer: &mut Lexer, open: Token, report: &mut Report) -> Option<()> {
+        loop {
+            let token = lexer.peek(report).filter(|token| {
+                let word = lexer.slice(*token);
+                let is_name = token.kind == TokenKind::Word && word[0].is_ascii_uppercase();
+                !(is_name && is_directive(word))
+            });
+            let Some(token) = token else {
+                return report.fail_help(open.span, "the list is not closed", "close it with ]");
+            };
+            lexer.next(report);
+            match token.kind {
+                TokenKind::Close => return Some(()),
+                TokenKind::Broken => return None,
+                TokenKind::Open => {
+                    report.error(token.span, "lists do not nest: [ within [ ]");
+                    self.values = Values::Broken;
+                }
+                _ => self.read(lexer, token, report),
+            }
+        }
     }
 
     fn read(&mut self, lexer: &Lexer, token: Token, report: &mut Report) {
@@ -468,13 +448,11 @@ impl ValueReader {
             _ => wanted.group(),
         };
         if !count.is_multiple_of(group) {
-            report.error(
-                span,
-                format!(
-                    "{} values come in groups of {group}, found {count} values",
-                    wanted.name()
-                ),
+            let message = format!(
+                "{} values come in groups of {group}, found {count} values",
+                wanted.name()
             );
+            report.error(span, message);
             self.values = Values::Broken;
         }
     }

@@ -7,7 +7,7 @@ use crate::arguments::{ACTIVE_TRANSFORMS, Arguments, Failed};
 use crate::directive::{DIRECTIVES, Directive, Handler, Quoted};
 use crate::lexer::{Lexer, Token, TokenKind, check_utf8};
 use crate::number::parse_float;
-use crate::params::{self, Outcome, Params, shorten};
+use crate::params::{self, Params, shorten};
 use crate::report::Report;
 use crate::source::Span;
 use crate::{suggest, version4};
@@ -81,11 +81,10 @@ impl Parser {
                 continue;
             };
             if !report.is_version4 && version4::DIRECTIVES.contains(&name) {
-                report.error_help(
-                    token.span,
-                    format!("{name} is a directive of pbrt-v4, but the scene is read as pbrt-v3"),
-                    "the main file decides by its first name that only one version has",
-                );
+                let message =
+                    format!("{name} is a directive of pbrt-v4, but the scene is read as pbrt-v3");
+                let help = "the main file decides by its first name that only one version has";
+                report.error_help(token.span, message, help);
                 skip_past_arguments(lexer, report);
                 continue;
             }
@@ -124,8 +123,8 @@ impl Parser {
             };
             self.current = includer.lexer;
             match params::parse(&mut self.current, report) {
-                Outcome::Complete(more) => params.extend(more, report),
-                Outcome::Failed => skip_to_directive(&mut self.current, report),
+                Some(more) => params.extend(more, report),
+                None => skip_to_directive(&mut self.current, report),
             }
         }
     }
@@ -149,23 +148,32 @@ impl Parser {
                 return false;
             }
         };
+        if !self.may_include(&path, file, is_new, report) {
+            return false;
+        }
+        let includer = std::mem::replace(&mut self.current, Lexer::new(report, file));
+        self.includers.push(Includer {
+            lexer: includer,
+            at: path.span,
+            import,
+        });
+        true
+    }
+
+    /// Whether a file is no includer of itself, and within all limits. Reports it otherwise.
+    fn may_include(&mut self, path: &Quoted, file: u32, is_new: bool, report: &mut Report) -> bool {
         let mut open = self.includers.iter().map(|includer| includer.lexer.file());
         if self.current.file() == file || open.any(|f| f == file) {
             let chain = self.chain(file, report);
-            report.error_once(
-                path.span,
-                format!("{:?} includes itself: {chain}", path.text),
-                Some("remove this Include"),
-            );
+            let message = format!("{:?} includes itself: {chain}", path.text);
+            report.error_once(path.span, message, Some("remove this Include"));
             return false;
         }
         if self.includers.len() == MAX_INCLUDE_DEPTH {
             let chain = self.chain(file, report);
-            report.error_once(
-                path.span,
-                format!("files include each other more than {MAX_INCLUDE_DEPTH} deep: {chain}"),
-                None,
-            );
+            let message =
+                format!("files include each other more than {MAX_INCLUDE_DEPTH} deep: {chain}");
+            report.error_once(path.span, message, None);
             return false;
         }
         self.includes += 1;
@@ -179,23 +187,15 @@ impl Parser {
         } else {
             self.again += report.sources.file(file).bytes.len() as u64;
             if self.again > MAX_TEXT_AGAIN {
-                report.error_help(
-                    path.span,
-                    format!(
-                        "files that are included again have more than {MAX_TEXT_AGAIN} bytes in all"
-                    ),
-                    "define an object once, and place it with ObjectInstance",
+                let message = format!(
+                    "files that are included again have more than {MAX_TEXT_AGAIN} bytes in all"
                 );
+                let help = "define an object once, and place it with ObjectInstance";
+                report.error_help(path.span, message, help);
                 report.end();
                 return false;
             }
         }
-        let includer = std::mem::replace(&mut self.current, Lexer::new(report, file));
-        self.includers.push(Includer {
-            lexer: includer,
-            at: path.span,
-            import,
-        });
         true
     }
 

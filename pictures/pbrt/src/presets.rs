@@ -2,6 +2,9 @@
 
 use antumbra_scene::Rgb;
 
+use crate::lookup::Lookup;
+use crate::suggest;
+
 /// Name, reduced scattering coefficient and absorption coefficient, in inverse millimetres.
 type Row = (&'static str, [f32; 3], [f32; 3]);
 
@@ -79,7 +82,7 @@ fn rows() -> impl Iterator<Item = &'static Row> {
 }
 
 /// Coefficients of a named material, in inverse millimetres.
-pub(crate) fn by_name(name: &str) -> Option<Coefficients> {
+fn by_name(name: &str) -> Option<Coefficients> {
     let (_, scattering, absorption) = rows().find(|row| row.0 == name)?;
     Some(Coefficients {
         absorption: Rgb::from(*absorption),
@@ -88,8 +91,21 @@ pub(crate) fn by_name(name: &str) -> Option<Coefficients> {
 }
 
 /// All names.
-pub(crate) fn names() -> Vec<&'static str> {
+fn names() -> Vec<&'static str> {
     rows().map(|row| row.0).collect()
+}
+
+/// Coefficients that a string parameter names. `None` without a name, and for an unknown one, which was reported.
+pub(crate) fn named(lookup: &mut Lookup, param: &'static str, noun: &str) -> Option<Coefficients> {
+    let (name, span) = lookup.string(param).filter(|(name, _)| !name.is_empty())?;
+    let found = by_name(name);
+    if found.is_none() {
+        let mistake = format!("no {noun} is named {name:?}");
+        let taken = "the coefficients of whole milk are taken";
+        let help = || suggest::help(name, &names());
+        lookup.report.tolerated(span, mistake, taken, help);
+    }
+    found
 }
 
 #[cfg(test)]

@@ -57,20 +57,16 @@ fn read_as(param: &Param, of: Of, report: &mut Report) -> Option<Rgb> {
                 Some(space) => space * Vec3::new(r, g, b).as_dvec3(),
             },
             [r, g, b] => {
-                return report.fail(
-                    param.list,
-                    format!("{name:?} must not be negative, found {r} {g} {b}"),
-                );
+                let message = format!("{name:?} must not be negative, found {r} {g} {b}");
+                return report.fail(param.list, message);
             }
             _ => return wrong_count(param, "three values", report),
         },
         _ => return wrong_count(param, "values", report),
     };
     if color.min_element() < 0.0 {
-        report.note(
-            param.declaration,
-            format!("{name:?} lies outside of RGB, its negative components are set to 0"),
-        );
+        let message = format!("{name:?} lies outside of RGB, its negative components are set to 0");
+        report.note(param.declaration, message);
     }
     let color = color.max(DVec3::ZERO).as_vec3();
     if !color.is_finite() {
@@ -92,10 +88,8 @@ fn color_of(samples: Vec<[f64; 2]>, of: Of, report: &Report) -> DVec3 {
 fn of_file(param: &Param, files: &[String], of: Of, report: &mut Report) -> Option<DVec3> {
     let name = &param.name;
     let [file] = files else {
-        return report.fail(
-            param.list,
-            format!("{name:?} takes one file, found {}", files.len()),
-        );
+        let message = format!("{name:?} takes one file, found {}", files.len());
+        return report.fail(param.list, message);
     };
     let named = match report.is_version4 {
         true => named_spectra::find(file),
@@ -109,11 +103,9 @@ fn of_file(param: &Param, files: &[String], of: Of, report: &mut Report) -> Opti
         None => match read_spd(file, report) {
             Ok(samples) => samples,
             Err(message) => {
-                return report.fail_help(
-                    param.value,
-                    format!("cannot read spectrum {file:?}: {message}"),
-                    format!("without the file, write it as \"rgb {name}\""),
-                );
+                let message = format!("cannot read spectrum {file:?}: {message}");
+                let help = format!("without the file, write it as \"rgb {name}\"");
+                return report.fail_help(param.value, message, help);
             }
         },
     };
@@ -140,14 +132,12 @@ fn black_body(param: &Param, values: &[f32], report: &mut Report) -> Option<DVec
 }
 
 fn wrong_count<T>(param: &Param, takes: &str, report: &mut Report) -> Option<T> {
-    report.fail(
-        param.list,
-        format!(
-            "{:?} takes {takes}, found {} values",
-            param.name,
-            param.values.len()
-        ),
-    )
+    let message = format!(
+        "{:?} takes {takes}, found {} values",
+        param.name,
+        param.values.len()
+    );
+    report.fail(param.list, message)
 }
 
 /// Converts XYZ to linear RGB with the primaries of sRGB and BT.709, by the matrix of pbrt-v3.

@@ -15,10 +15,8 @@ impl Builder<'_> {
     /// Returns true if a directive is allowed in the current section. Otherwise reports it.
     pub(super) fn check_phase(&self, at: Span, directive: &Directive, report: &mut Report) -> bool {
         if self.phase == Phase::Done {
-            report.unsupported(
-                at,
-                "directives after WorldEnd (several pictures in one file) are",
-            );
+            let feature = "directives after WorldEnd (several pictures in one file) are";
+            report.unsupported(at, feature);
             return false;
         }
         if directive.phase().is_none_or(|phase| phase == self.phase) {
@@ -56,10 +54,8 @@ impl Builder<'_> {
     pub(super) fn report_open_blocks(&mut self, report: &mut Report) {
         for block in self.state.blocks() {
             let [begin, end] = block.kind.names();
-            report.error(
-                block.begun_at,
-                format!("the {begin} has no {end} before the world ends"),
-            );
+            let message = format!("the {begin} has no {end} before the world ends");
+            report.error(block.begun_at, message);
         }
         while !self.state.blocks().is_empty() {
             self.state.pop();
@@ -90,14 +86,11 @@ impl Builder<'_> {
         };
         for block in &blocks[depth + 1..] {
             let [inner_begin, inner_end] = block.kind.names();
-            report.error_help(
-                at,
-                format!(
-                    "{end} comes before the {inner_end} of the {inner_begin} in line {}",
-                    block.begun_at.line
-                ),
-                format!("add {inner_end} before it"),
+            let message = format!(
+                "{end} comes before the {inner_end} of the {inner_begin} in line {}",
+                block.begun_at.line
             );
+            report.error_help(at, message, format!("add {inner_end} before it"));
         }
         while self.state.blocks().len() > depth {
             self.state.pop();

@@ -30,10 +30,8 @@ impl Builder<'_> {
             return;
         };
         if medium.density.is_some() && self.state.now.transforms.is_animated() {
-            report.note(
-                at,
-                "media do not move: the transformation at the start is taken",
-            );
+            let message = "media do not move: the transformation at the start is taken";
+            report.note(at, message);
         }
         let cells = medium.density.as_ref().map_or(0, |grid| grid.values.len());
         let bytes = size_of::<Medium>() as u64 + size_of::<f32>() as u64 * cells as u64;

@@ -17,10 +17,8 @@ const ELLIPSOID: &str =
 impl Builder<'_> {
     pub(super) fn object_begin(&mut self, at: Span, name: Quoted, report: &mut Report) {
         if let Some(outer) = self.state.now.object {
-            report.error(
-                at,
-                format!("ObjectBegin within that of line {}", outer.line),
-            );
+            let message = format!("ObjectBegin within that of line {}", outer.line);
+            report.error(at, message);
         }
         self.begin_block(BlockKind::Object, at, report);
         // The name now refers to the new object. Earlier instances keep their object.

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use antumbra_scene::{Geometry, Instance, Material, Object, Param, Shape};
+use antumbra_scene::{AreaLight, Geometry, Instance, Material, Object, Param, Shape};
 use glam::{DMat4, DVec3};
 
 use super::{Builder, SINGULAR, SINGULAR_HELP};
@@ -34,10 +34,7 @@ impl Builder<'_> {
             return;
         };
         let Place {
-            to_world,
-            is_of_object,
-            moves,
-            ..
+            to_world, moves, ..
         } = place;
         // The shape's lookup may fall back on parameters of the material, which must live as long.
         let current = self.state.now.material.clone();
@@ -51,16 +48,7 @@ impl Builder<'_> {
         let Some((source, cutouts)) = read else {
             return;
         };
-        let area_light = self.state.now.area_light.clone();
-        if area_light.is_some() && (moves || is_of_object) {
-            report.note(
-                at,
-                match moves {
-                    true => "area lights of shapes that move are left out, as in pbrt-v3",
-                    false => "area lights of objects are left out: in pbrt-v3 they light nothing",
-                },
-            );
-        }
+        let area_light = self.area_light(at, &place, report);
         let (geometry, mesh_file) = match source {
             Source::Here(geometry) => (geometry, None),
             // The mesh of the file replaces the empty one later.
@@ -87,7 +75,7 @@ impl Builder<'_> {
         let shape = Shape {
             geometry,
             material,
-            area_light: area_light.filter(|_| !is_of_object && !moves && kind.text != "curve"),
+            area_light: area_light.filter(|_| kind.text != "curve"),
             media,
             alpha: cutouts.alpha,
             shadow_alpha: cutouts.shadow_alpha,
@@ -98,6 +86,20 @@ impl Builder<'_> {
             report.unsupported(at, "an invisible light (\"alpha\" 0) is");
         }
         self.add(at, shape, mesh_file, &place, report);
+    }
+
+    /// Emission of the current shape, which must be at rest and in the world.
+    fn area_light(&self, at: Span, place: &Place, report: &mut Report) -> Option<AreaLight> {
+        let light = self.state.now.area_light.clone()?;
+        if !place.moves && !place.is_of_object {
+            return Some(light);
+        }
+        let message = match place.moves {
+            true => "area lights of shapes that move are left out, as in pbrt-v3",
+            false => "area lights of objects are left out: in pbrt-v3 they light nothing",
+        };
+        report.note(at, message);
+        None
     }
 
     /// Where the current shape is. `None`: a mistake was reported.

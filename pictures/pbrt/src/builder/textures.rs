@@ -25,10 +25,8 @@ impl Builder<'_> {
         report: &mut Report,
     ) {
         if self.transforms().is_animated() {
-            report.note(
-                at,
-                "textures do not move: the transformation at the start is taken",
-            );
+            let message = "textures do not move: the transformation at the start is taken";
+            report.note(at, message);
         }
         self.pending_textures.push(texture::Declaration {
             at,

@@ -26,18 +26,14 @@ impl Textured<'_> {
             }
             Limit::Angle if !(0.0..=90.0).contains(&value) => {
                 let clamped = value.clamp(0.0, 90.0);
-                report.note(
-                    span,
-                    format!("{name} {value} is taken as {clamped}, as pbrt does"),
-                );
+                let message = format!("{name} {value} is taken as {clamped}, as pbrt does");
+                report.note(span, message);
                 Some(clamped.into())
             }
             Limit::UpTo(most) if !(0.0..=most).contains(&value) => {
                 let nearest = value.clamp(0.0, most);
-                report.note(
-                    span,
-                    format!("{name:?} is taken as {nearest}, found {value}"),
-                );
+                let message = format!("{name:?} is taken as {nearest}, found {value}");
+                report.note(span, message);
                 Some(nearest.into())
             }
             _ => Some(found),

@@ -6,29 +6,16 @@ use antumbra_scene::{Interior, Material, Param, Rgb};
 use super::{remap_roughness, roughness_along};
 use crate::lookup::{Lookup, POSITIVE};
 use crate::presets;
-use crate::suggest;
 use crate::texture::Textured;
 
 /// Material `subsurface`: by coefficients, or by the name of a measured material.
 pub(super) fn coefficients(values: &mut Textured) -> Material {
-    let mut found = presets::DEFAULT;
-    let mut asymmetry = asymmetry(values);
-    let named = values.string("name");
-    if let Some((name, span)) = named.filter(|(name, _)| !name.is_empty()) {
-        match presets::by_name(name) {
-            Some(preset) => {
-                found = preset;
-                // Measured coefficients are reduced ones.
-                asymmetry = 0.0;
-            }
-            None => values.report.tolerated(
-                span,
-                format!("no material is named {name:?}"),
-                "the coefficients of whole milk are taken",
-                || suggest::help(name, &presets::names()),
-            ),
-        }
-    }
+    let own = asymmetry(values);
+    // Measured coefficients are reduced ones.
+    let (found, asymmetry) = match presets::named(values, "name", "material") {
+        Some(measured) => (measured, 0.0),
+        None => (presets::DEFAULT, own),
+    };
     let interior = Interior::Coefficients {
         absorption: color(values, "sigma_a", found.absorption),
         scattering: color(values, "sigma_s", found.scattering),

@@ -100,10 +100,8 @@ fn index(values: &mut Textured, name: &'static str) -> Param<f32> {
             (index as f32).into()
         }
         None => {
-            values.report.unsupported(
-                param.value,
-                "a spectrum from a file as an index of refraction is",
-            );
+            let feature = "a spectrum from a file as an index of refraction is";
+            values.report.unsupported(param.value, feature);
             1.5.into()
         }
     }
@@ -142,11 +140,9 @@ fn conductor(values: &mut Textured, roughness: [Param<f32>; 2]) -> Material {
     }
     match reflectance {
         Some((Param::Texture(texture), span)) => {
-            values.report.note(
-                span,
-                "a texture of a conductor's reflectance is rendered with Schlick's Fresnel term and the roughness \
-                 along u",
-            );
+            let message = "a texture of a conductor's reflectance is rendered with Schlick's Fresnel term and the \
+                           roughness along u";
+            values.report.note(span, message);
             let [u, _] = roughness;
             Material::Metallic(Metallic {
                 color: Param::Texture(texture),

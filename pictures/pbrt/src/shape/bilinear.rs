@@ -53,10 +53,8 @@ pub(super) fn bilinear_mesh(lookup: &mut Lookup, middle: DVec3) -> Option<Triang
         };
         patch(&mut mesh, p.map(|p| p - middle), n, uv);
         if mesh.bytes() > lookup.report.sources.limit.min(MAX_SUBDIVIDED) {
-            return lookup.fail_help(
-                "the patches make more triangles than memory allows",
-                "take fewer patches, or allow more memory",
-            );
+            let message = "the patches make more triangles than memory allows";
+            return lookup.fail_help(message, "take fewer patches, or allow more memory");
         }
     }
     Some(mesh)

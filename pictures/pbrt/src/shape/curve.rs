@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use antumbra_scene::{CurveProfile, Curves, Geometry};
-use glam::DVec3;
+use glam::{DMat4, DVec3};
 
 use super::ribbon;
 use crate::lookup::{Lookup, NOT_NEGATIVE};
@@ -17,8 +17,9 @@ const MAX_SEGMENTS: usize = 1 << 14;
 /// Control points of a cubic Bézier curve.
 pub(super) type Bezier = [DVec3; 4];
 
-/// Reads a `curve`, whose points are measured from `middle` before they are rounded. `None`: a mistake was reported.
-pub(super) fn curve(lookup: &mut Lookup, middle: DVec3) -> Option<Geometry> {
+/// Reads a `curve`, whose points are measured from `middle` before they are rounded, and moves it from there. `None`: a mistake
+/// was reported.
+pub(super) fn curve(lookup: &mut Lookup, middle: DVec3, from_middle: &DMat4) -> Option<Geometry> {
     let kinds = [
         ("flat", Some(CurveProfile::Flat)),
         ("cylinder", Some(CurveProfile::Round)),
@@ -54,12 +55,16 @@ pub(super) fn curve(lookup: &mut Lookup, middle: DVec3) -> Option<Geometry> {
         *point -= middle;
     }
     match (profile, normals) {
-        (Some(profile), _) => Some(Geometry::Curves(Arc::new(curves(
-            &segments, widths, profile,
-        )))),
-        (None, Some(normals)) if normals.len() == segments.len() + 1 => Some(Geometry::Mesh(
-            Arc::new(ribbon::mesh(&segments, widths, &normals)),
-        )),
+        (Some(profile), _) => {
+            let mut curves = curves(&segments, widths, profile);
+            curves.transform(from_middle);
+            Some(Geometry::Curves(Arc::new(curves)))
+        }
+        (None, Some(normals)) if normals.len() == segments.len() + 1 => {
+            let mut mesh = ribbon::mesh(&segments, widths, &normals);
+            mesh.transform(from_middle);
+            Some(Geometry::Mesh(Arc::new(mesh)))
+        }
         (None, found) => {
             let (found, needed) = (found.map_or(0, |n| n.len()), segments.len() + 1);
             lookup.fail(format!(

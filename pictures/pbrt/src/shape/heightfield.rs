@@ -27,10 +27,8 @@ pub(super) fn heightfield(lookup: &mut Lookup) -> Option<TriangleMesh> {
     }
     if let Some(index) = values.iter().position(|z| !z.is_finite()) {
         let span = heights.value_span(index, lookup.report);
-        return lookup.report.fail(
-            span,
-            format!("\"Pz\" must be finite, found {}", values[index]),
-        );
+        let message = format!("\"Pz\" must be finite, found {}", values[index]);
+        return lookup.report.fail(span, message);
     }
     let mut mesh = grid::mesh([nu - 1, nv - 1], |u, v| (DVec3::new(u, v, 0.0), DVec3::Z));
     mesh.normals.clear();

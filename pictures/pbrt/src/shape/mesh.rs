@@ -127,10 +127,9 @@ pub(super) fn subdivided(lookup: &mut Lookup, middle: DVec3) -> Option<TriangleM
         .checked_mul(1 << (2 * levels))
         .and_then(|triangles| triangles.checked_mul(BYTES_PER_TRIANGLE));
     if bytes.is_none_or(|bytes| bytes > lookup.report.sources.limit.min(MAX_SUBDIVIDED)) {
-        lookup.error_help(
-            format!("{levels} levels of subdivision make more triangles than memory allows"),
-            "take fewer levels, or allow more memory",
-        );
+        let message =
+            format!("{levels} levels of subdivision make more triangles than memory allows");
+        lookup.error_help(message, "take fewer levels, or allow more memory");
     }
     lookup.report.clean_since(errors_before)?;
     let mut surface = match Surface::new(points.collect(), indices) {
@@ -142,10 +141,9 @@ pub(super) fn subdivided(lookup: &mut Lookup, middle: DVec3) -> Option<TriangleM
                     "the triangles at the edge from vertex {from} to {to} are no neighbours"
                 ),
             };
-            return lookup.fail_help(
-                format!("the mesh is no surface: {problem}"),
-                "an edge has at most two triangles, with their corners in the same sense",
-            );
+            let message = format!("the mesh is no surface: {problem}");
+            let help = "an edge has at most two triangles, with their corners in the same sense";
+            return lookup.fail_help(message, help);
         }
     };
     for _ in 0..levels {

@@ -85,14 +85,9 @@ pub(crate) fn read(
             return Some((Source::File(file), cutouts));
         }
         "curve" => {
-            let mut geometry = curve::curve(lookup, middle)?;
+            let geometry = curve::curve(lookup, middle, &from_middle)?;
             if is_emitter {
                 lookup.unsupported("an area light on a curve is");
-            }
-            match &mut geometry {
-                Geometry::Curves(curves) => Arc::make_mut(curves).transform(&from_middle),
-                Geometry::Mesh(mesh) => Arc::make_mut(mesh).transform(&from_middle),
-                Geometry::Sphere(_) => {}
             }
             return Some((Source::Here(geometry), cutouts));
         }

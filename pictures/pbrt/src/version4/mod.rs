@@ -99,16 +99,12 @@ pub(crate) fn say(file: u32, report: &mut Report) {
         line: 1,
     };
     if report.error_count() > 0 {
-        report.error_help(
-            start,
-            "this is a scene of pbrt-v4, of which not everything is read",
-            "errors name what is not read; docs/src/pbrt-support.md has the list",
-        );
+        let message = "this is a scene of pbrt-v4, of which not everything is read";
+        let help = "errors name what is not read; docs/src/pbrt-support.md has the list";
+        report.error_help(start, message, help);
     } else {
-        report.note(
-            start,
-            "this is a scene of pbrt-v4; docs/src/pbrt-support.md lists what differs",
-        );
+        let message = "this is a scene of pbrt-v4; docs/src/pbrt-support.md lists what differs";
+        report.note(start, message);
     }
 }
 
@@ -198,10 +194,8 @@ fn film(kind: &mut Quoted, params: &mut Params, report: &mut Report) {
     }
     let speed = params.take_float("iso").unwrap_or(100.0);
     if !(speed > 0.0 && speed.is_finite()) {
-        report.error(
-            kind.span,
-            format!("\"iso\" must be positive, found {speed}"),
-        );
+        let message = format!("\"iso\" must be positive, found {speed}");
+        report.error(kind.span, message);
     }
     params.set_float("scale", speed / 100.0, kind.span);
     if let Some(most) = params.take_float("maxcomponentvalue") {
@@ -226,10 +220,8 @@ fn integrator(kind: &mut Quoted, params: &mut Params, report: &mut Report) {
         _ => return,
     };
     if kind.text == "lightpath" {
-        report.note(
-            kind.span,
-            "integrator \"lightpath\" is taken as \"volpath\"",
-        );
+        let message = "integrator \"lightpath\" is taken as \"volpath\"";
+        report.note(kind.span, message);
     }
     kind.text = name.into();
     for noise in [
@@ -241,10 +233,8 @@ fn integrator(kind: &mut Quoted, params: &mut Params, report: &mut Report) {
         params.drop(noise);
     }
     if params.bool("regularize") == Some(true) {
-        report.note(
-            kind.span,
-            "\"regularize\" is left out: nothing is made rougher against noise",
-        );
+        let message = "\"regularize\" is left out: nothing is made rougher against noise";
+        report.note(kind.span, message);
     }
     params.drop("regularize");
 }
@@ -356,10 +346,9 @@ fn image_or_scale(class: &mut Quoted, params: &mut Params, report: &mut Report) 
             }
             if params.find("filter").is_some() {
                 params.drop("filter");
-                report.note(
-                    class.span,
-                    "the filter of image maps is left out: they are filtered by pbrt-v3's default",
-                );
+                let message =
+                    "the filter of image maps is left out: they are filtered by pbrt-v3's default";
+                report.note(class.span, message);
             }
         }
         // The factor is a number in version 4, also for textures of colours.
@@ -402,10 +391,9 @@ pub(crate) fn exposure(params: &Params, at: Span, report: &mut Report) -> f32 {
     if exposure > 0.0 && exposure.is_finite() {
         return exposure;
     }
-    report.error(
-        at,
-        format!("the shutter of the camera is open for {exposure}, not for a positive time"),
-    );
+    let message =
+        format!("the shutter of the camera is open for {exposure}, not for a positive time");
+    report.error(at, message);
     1.0
 }
 
@@ -513,10 +501,8 @@ pub(crate) fn option(params: &Params, report: &mut Report) {
     for param in &params.list {
         let name = param.name.as_str();
         if OPTIONS_LEFT_OUT.contains(&name) {
-            report.note(
-                param.declaration,
-                format!("option {name:?} is left out: it changes no picture"),
-            );
+            let message = format!("option {name:?} is left out: it changes no picture");
+            report.note(param.declaration, message);
         } else if param.values != Values::Bools(vec![false]) {
             report.unsupported(param.declaration, format!("option {name:?} is"));
         }
