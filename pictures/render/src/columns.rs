@@ -80,7 +80,7 @@ impl<T: Zero, const N: usize> Zero for [T; N] {
 
 macro_rules! zero {
     ($($Type:ty)*) => {
-        $(impl Zero for $Type {
+        $(impl $crate::columns::Zero for $Type {
             fn zero() -> Self {
                 Self::default()
             }
@@ -88,7 +88,15 @@ macro_rules! zero {
     };
 }
 
-zero!(f32 f64 u32 bool Column3);
+pub(crate) use zero;
+
+zero!(f32 f64 u32 bool usize Column3);
+
+impl<T> Zero for Vec<T> {
+    fn zero() -> Self {
+        Self::new()
+    }
+}
 
 /// `a` if `first`, else `b`, without a branch.
 #[inline(always)]

@@ -13,13 +13,12 @@
 
 use std::ops::ControlFlow;
 
-use antumbra::Ray;
 use antumbra_scene::DirectStrategy;
 use glam::Vec3;
 
 use super::arrival::{Arrivals, Points};
 use super::hits::Hits;
-use super::path::{receiver, shade};
+use super::path::{Paths, receiver, shade};
 use super::tracer::Tracer;
 use super::{Batch, ENOUGH, ShadowQueue, dimension, power_heuristic};
 use crate::columns::BLOCK;
@@ -56,37 +55,22 @@ struct Fan {
 /// Number of light samples of a point from which they are taken in columns, whose loops always run over all lanes.
 const MANY: usize = 16;
 
-/// Rays of the specular trees of a batch at one depth.
-#[derive(Debug, Default)]
-struct Branches {
-    rays: Vec<Ray>,
-    samples: Vec<u32>,
-    throughput: Vec<Vec3>,
+/// A ray of the specular trees of a batch.
+#[derive(Clone, Copy, Debug)]
+struct Branch {
+    sample: u32,
+    throughput: Vec3,
     /// Place in the binary tree of branches. The camera ray has 1, the branches of n have 2n and 2n + 1.
-    place: Vec<u64>,
+    place: u64,
 }
 
-impl Branches {
-    fn clear(&mut self) {
-        self.rays.clear();
-        self.samples.clear();
-        self.throughput.clear();
-        self.place.clear();
-    }
-
-    fn push(&mut self, ray: Ray, sample: u32, throughput: Vec3, place: u64) {
-        self.rays.push(ray);
-        self.samples.push(sample);
-        self.throughput.push(throughput);
-        self.place.push(place);
-    }
-}
+/// Rays of the specular trees of a batch at one depth.
+type Branches = Paths<Branch>;
 
 /// Rays along BSDF samples that look for lights.
 #[derive(Debug, Default)]
 struct Probes {
-    rays: Vec<Ray>,
-    probes: Vec<Probe>,
+    queue: Paths<Probe>,
     /// Emitter on the way of each probe, if there is one.
     hits: Hits,
     shadows: ShadowQueue,
@@ -140,7 +124,7 @@ impl DirectLighting {
     /// Approximate length of the longest queue of probes so far: the room made for rays.
     #[cfg(test)]
     pub fn most_probes(&self) -> usize {
-        self.probes.rays.capacity()
+        self.probes.queue.rays.capacity()
     }
 
     /// Has every light sample taken by itself; returns whether they were taken in columns.
@@ -159,7 +143,12 @@ impl DirectLighting {
     ) {
         self.current.clear();
         for (sample, &ray) in batch.rays.iter().enumerate() {
-            self.current.push(ray, sample as u32, Vec3::ONE, 1);
+            let branch = Branch {
+                sample: sample as u32,
+                throughput: Vec3::ONE,
+                place: 1,
+            };
+            self.current.push(ray, branch);
         }
         let mut depth = 0_u32;
         while !self.current.rays.is_empty() && !tracer.is_stopped() {
@@ -169,7 +158,7 @@ impl DirectLighting {
                 follow: depth.saturating_add(1) < self.max_depth,
             };
             while !self.current.rays.is_empty() && !tracer.is_stopped() {
-                let samples = self.current.samples.iter().copied();
+                let samples = self.current.states.iter().map(|branch| branch.sample);
                 self.hits.find(tracer, &self.current.rays, samples);
                 self.through.clear();
                 for index in 0..self.current.rays.len() {
@@ -198,9 +187,8 @@ impl DirectLighting {
         index: usize,
         step: Step,
     ) {
-        let sample = self.current.samples[index];
-        let throughput = self.current.throughput[index];
-        let place = self.current.place[index];
+        let branch = self.current.states[index];
+        let (sample, throughput) = (branch.sample, branch.throughput);
         let rays = &self.current.rays;
         let Some(surface) = self.hits.surface(&world.shapes, rays, index) else {
             let escaped = world.lights.escaped(Vec3::from(rays[index].dir));
@@ -213,7 +201,7 @@ impl DirectLighting {
         let own = (&rays[index], sample, step.from_camera);
         let Some((bsdf, frame)) = shade(world, batch, own, &surface, hit) else {
             let ray = surface.ray_along(rays[index].dir.into());
-            self.through.push(ray, sample, throughput, place);
+            self.through.push(ray, branch);
             return;
         };
         let bsdf = &*bsdf;
@@ -231,29 +219,39 @@ impl DirectLighting {
             frame,
             wo,
             receiver: receiver(bsdf, &surface),
-            sample,
-            throughput,
-            place,
+            branch,
             probes_each: self.probes_each,
         };
         let delta_share = bsdf.delta_share();
         if delta_share < 1.0 {
-            match self.strategy {
-                DirectStrategy::All => match &mut self.fan {
-                    Some(fan) => vertex.ask_in_columns(fan, tracer, batch, shadows),
-                    None => vertex.ask_all(tracer, batch, shadows),
-                },
-                DirectStrategy::One => vertex.ask_one(tracer, batch, shadows),
-            }
-            for part in 0..self.probes_each {
-                vertex.probe(part, &mut self.probes);
-                if self.probes.rays.len() >= ENOUGH {
-                    self.probes.trace(world, tracer, batch, self.strategy);
-                }
-            }
+            self.light(&vertex, tracer, batch, shadows);
         }
         if step.follow && delta_share > 0.0 {
             vertex.follow(&mut self.next);
+        }
+    }
+
+    /// Takes the light samples and probes of a point.
+    fn light(
+        &mut self,
+        vertex: &Vertex,
+        tracer: &mut Tracer,
+        batch: &mut Batch,
+        shadows: &mut ShadowQueue,
+    ) {
+        match self.strategy {
+            DirectStrategy::All => match &mut self.fan {
+                Some(fan) => vertex.ask_in_columns(fan, tracer, batch, shadows),
+                None => vertex.ask_all(tracer, batch, shadows),
+            },
+            DirectStrategy::One => vertex.ask_one(tracer, batch, shadows),
+        }
+        for part in 0..self.probes_each {
+            vertex.probe(part, &mut self.probes.queue);
+            if self.probes.queue.rays.len() >= ENOUGH {
+                self.probes
+                    .trace(vertex.world, tracer, batch, self.strategy);
+            }
         }
     }
 }
@@ -278,16 +276,15 @@ struct Vertex<'a> {
     frame: Frame,
     wo: Vec3,
     receiver: Receiver,
-    sample: u32,
-    throughput: Vec3,
-    place: u64,
+    branch: Branch,
     probes_each: u32,
 }
 
 impl Vertex<'_> {
     /// Dimension of the random values of a purpose. Differs for every branch, light and element.
     fn dimension(&self, purpose: Purpose, light: usize, element: usize) -> u32 {
-        let address = mix((light as u64) << 32 | element as u64) ^ mix(self.place) ^ purpose as u64;
+        let address =
+            mix((light as u64) << 32 | element as u64) ^ mix(self.branch.place) ^ purpose as u64;
         dimension::FIRST.wrapping_add(mix(address) as u32)
     }
 
@@ -371,7 +368,7 @@ impl Vertex<'_> {
             }
         }
         arrivals.bring(isa, self, found);
-        arrivals.queue(count, |_| self.sample, shadows);
+        arrivals.queue(count, |_| self.branch.sample, shadows);
     }
 
     /// Samples one light, once.
@@ -395,17 +392,13 @@ impl Vertex<'_> {
         let wi = self.frame.to_local(found.wi);
         let evaluation = bsdf.evaluate(self.wo, wi, self.surface.faces_same_side(found.wi));
         let density = found.pdf * expected;
-        let technique = if found.is_delta {
-            1.0
-        } else {
-            power_heuristic(density, evaluation.pdf * self.probes_each as f32)
-        };
-        let brought = self.throughput
+        let technique = found.technique(density, evaluation.pdf * self.probes_each as f32);
+        let brought = self.branch.throughput
             * evaluation.value
             * found.radiance
             * (wi.z.abs() * technique / density);
         if brought != Vec3::ZERO {
-            shadows.push(found.shadow_ray(self.surface), self.sample, brought);
+            shadows.push(found.shadow_ray(self.surface), self.branch.sample, brought);
         }
     }
 
@@ -419,18 +412,23 @@ impl Vertex<'_> {
         ];
         for (side, lobe) in lobes.into_iter().enumerate() {
             let Some(lobe) = lobe else { continue };
-            let throughput = self.throughput * lobe.weight;
+            let throughput = self.branch.throughput * lobe.weight;
             if throughput != Vec3::ZERO {
                 let ray = self.surface.ray_along(self.frame.to_world(lobe.wi));
                 // Beyond 63 levels places repeat, which correlates values but adds no bias.
-                let place = self.place.wrapping_mul(2).wrapping_add(side as u64);
-                next.push(ray, self.sample, throughput, place);
+                let place = self.branch.place.wrapping_mul(2);
+                let branch = Branch {
+                    sample: self.branch.sample,
+                    throughput,
+                    place: place.wrapping_add(side as u64),
+                };
+                next.push(ray, branch);
             }
         }
     }
 
     /// Queues a probe.
-    fn probe(&self, part: u32, probes: &mut Probes) {
+    fn probe(&self, part: u32, probes: &mut Paths<Probe>) {
         let bsdf = self.bsdf;
         let u = |purpose| {
             let dimension = self.dimension(purpose, 0, 0);
@@ -442,15 +440,15 @@ impl Vertex<'_> {
         let wi = self.frame.to_world(local);
         let evaluation = bsdf.evaluate(self.wo, local, self.surface.faces_same_side(wi));
         let density = evaluation.pdf * self.probes_each as f32;
-        let weight = self.throughput * evaluation.value * (local.z.abs() / density);
+        let weight = self.branch.throughput * evaluation.value * (local.z.abs() / density);
         if density > 0.0 && weight != Vec3::ZERO {
-            probes.rays.push(self.surface.ray_along(wi));
-            probes.probes.push(Probe {
-                sample: self.sample,
+            let probe = Probe {
+                sample: self.branch.sample,
                 from: self.receiver,
                 density,
                 weight,
-            });
+            };
+            probes.push(self.surface.ray_along(wi), probe);
         }
     }
 }
@@ -474,7 +472,7 @@ impl Points for Vertex<'_> {
 
     #[inline(always)]
     fn throughput(&self, _: usize) -> Vec3 {
-        self.throughput
+        self.branch.throughput
     }
 
     #[inline(always)]
@@ -512,10 +510,10 @@ impl Probes {
         batch: &mut Batch,
         strategy: DirectStrategy,
     ) {
-        let Self { rays, hits, .. } = self;
-        hits.find_emitters(&world.emitters, rays);
-        for (index, (ray, probe)) in rays.iter().zip(&self.probes).enumerate() {
-            let (light, ray) = match hits.surface_and_way(&world.shapes, rays, index) {
+        let Paths { rays, states } = &self.queue;
+        self.hits.find_emitters(&world.emitters, rays);
+        for (index, (ray, probe)) in rays.iter().zip(states).enumerate() {
+            let (light, ray) = match self.hits.surface_and_way(&world.shapes, rays, index) {
                 None => (probe.escape(world, Vec3::from(ray.dir), strategy), *ray),
                 Some((surface, ray)) => (probe.meet(world, &surface, strategy), ray),
             };
@@ -525,8 +523,7 @@ impl Probes {
             }
         }
         self.shadows.flush_probes(tracer, batch);
-        self.rays.clear();
-        self.probes.clear();
+        self.queue.clear();
     }
 }
 

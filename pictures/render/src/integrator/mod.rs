@@ -29,6 +29,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::film::Sample;
+use crate::light::LightSample;
 use crate::sampler::{Sampler, Stream};
 use crate::world::{Camera, World};
 pub use hits::Hits;
@@ -190,21 +191,7 @@ impl Integrator {
     pub fn new(world: &World) -> Self {
         use antumbra_scene::Integrator as Scene;
         let method = match world.integrator {
-            Scene::Path {
-                max_depth,
-                rr_threshold,
-                // `Lights` has applied the strategy.
-                light_strategy: _,
-            } if !world.has_bodies() => {
-                Method::Path(path::PathTracer::new(max_depth, rr_threshold))
-            }
-            Scene::VolumePath {
-                max_depth,
-                rr_threshold,
-                light_strategy: _,
-            } if !world.has_volumes() => {
-                Method::Path(path::PathTracer::new(max_depth, rr_threshold))
-            }
+            // `Lights` has applied the strategy.
             Scene::Path {
                 max_depth,
                 rr_threshold,
@@ -214,15 +201,23 @@ impl Integrator {
                 max_depth,
                 rr_threshold,
                 light_strategy: _,
-            } => Method::Volume(volume::VolumePathTracer::new(max_depth, rr_threshold)),
+            } => {
+                let has_insides = match world.integrator {
+                    Scene::Path { .. } => world.has_bodies(),
+                    _ => world.has_volumes(),
+                };
+                match has_insides {
+                    true => Method::Volume(volume::VolumePathTracer::new(max_depth, rr_threshold)),
+                    false => Method::Path(path::PathTracer::new(max_depth, rr_threshold)),
+                }
+            }
             Scene::DirectLighting {
                 strategy,
                 max_depth,
             } => {
                 let lights = world.lights.all();
-                Method::Direct(Box::new(direct::DirectLighting::new(
-                    strategy, max_depth, lights,
-                )))
+                let direct = direct::DirectLighting::new(strategy, max_depth, lights);
+                Method::Direct(Box::new(direct))
             }
             Scene::AmbientOcclusion {
                 samples,
@@ -262,6 +257,17 @@ impl Integrator {
 fn power_heuristic(own: f32, other: f32) -> f32 {
     let ratio = other / own;
     1.0 / (1.0 + ratio * ratio)
+}
+
+impl LightSample {
+    /// Weight of a sample of density `own`, which the BSDF or the medium draws with density `other`. 1 if only lights find it.
+    fn technique(&self, own: f32, other: f32) -> f32 {
+        if self.is_delta {
+            1.0
+        } else {
+            power_heuristic(own, other)
+        }
+    }
 }
 
 #[cfg(test)]

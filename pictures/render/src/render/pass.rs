@@ -145,6 +145,23 @@ impl<'a> Worker<'a> {
         radiance[earlier.min(radiance.len())..].iter()
     }
 
+    /// Says to an observer which paths the current samples are.
+    fn announce(&mut self, tile: usize) {
+        let Some(queries) = self.tracer.queries() else {
+            return;
+        };
+        let selection = self.learned.selection;
+        let is_traced = |sample: Sample| selection.is_none_or(|taken| !taken.takes(sample));
+        let traced = self.samples.iter().filter(|sample| is_traced(**sample));
+        self.pixels.clear();
+        self.pixels.extend(traced.map(|sample| sample.pixel));
+        queries.begin(&PathBatch {
+            tile,
+            first: self.samples.first().map_or(0, |sample| sample.index),
+            pixels: &self.pixels,
+        });
+    }
+
     /// Traces the current samples and adds them to the tile. `logged` has the radiance of samples of the pre-pass.
     /// `None` when cancelled: no sample was added.
     fn batch(
@@ -161,18 +178,7 @@ impl<'a> Worker<'a> {
                 job.push(sample, &mut self.batch);
             }
         }
-        if let Some(queries) = self.tracer.queries() {
-            let selection = self.learned.selection;
-            let is_traced = |sample: Sample| selection.is_none_or(|taken| !taken.takes(sample));
-            let traced = self.samples.iter().filter(|sample| is_traced(**sample));
-            self.pixels.clear();
-            self.pixels.extend(traced.map(|sample| sample.pixel));
-            queries.begin(&PathBatch {
-                tile: index,
-                first: self.samples.first().map_or(0, |sample| sample.index),
-                pixels: &self.pixels,
-            });
-        }
+        self.announce(index);
         self.integrator
             .trace(job.world, &mut self.tracer, &mut self.batch, self.costs);
         if self.tracer.is_stopped() {
@@ -187,23 +193,13 @@ impl<'a> Worker<'a> {
         self.accumulator.add(self.thread, |tile| {
             let mut traced = 0;
             for &sample in &self.samples {
-                let (inside, radiance) = if self.is_logged(sample) {
+                if self.is_logged(sample) {
                     let radiance = logged.next().copied().unwrap_or(Vec3::NAN);
-                    (job.inside(sample), radiance)
+                    tile.film.add(sample.pixel, job.inside(sample), radiance);
                 } else {
-                    if let Some(costs) = &mut tile.costs {
-                        let [x, y] = sample.pixel;
-                        let (row, column) = (y - window.y0, x - window.x0);
-                        costs[row as usize * window.width() + column as usize]
-                            .add(&self.batch.costs[traced]);
-                    }
+                    tile.add(window, sample.pixel, &self.batch, traced);
                     traced += 1;
-                    (
-                        self.batch.inside[traced - 1],
-                        self.batch.radiance(traced - 1),
-                    )
-                };
-                tile.film.add(sample.pixel, inside, radiance);
+                }
                 tile.done = tile.done.max(sample.index + 1);
             }
             tile.effort.add(&Effort {

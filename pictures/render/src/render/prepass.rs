@@ -47,16 +47,17 @@ pub fn run(
 ) -> Result<(Prepass, TrainingSample), Error> {
     let tiles = job.todo.len();
     let mut sum = empty.clone();
-    let mut prepass = Prepass {
-        radiance: vec![Vec::new(); job.tiles.count()],
-        counts: Counts::default(),
-        busy: Duration::ZERO,
+    let radiance = Mutex::new(vec![Vec::new(); job.tiles.count()]);
+    let (mut counts, mut busy) = (Counts::default(), Duration::ZERO);
+    let prepass = |radiance: Mutex<_>, counts, busy| Prepass {
+        radiance: (radiance.into_inner()).unwrap_or_else(PoisonError::into_inner),
+        counts,
+        busy,
     };
     let Some(selection) = selection else {
-        return Ok((prepass, sum));
+        return Ok((prepass(radiance, counts, busy), sum));
     };
     let group = group_size(job, selection);
-    let radiance = Mutex::new(std::mem::take(&mut prepass.radiance));
     let moving = job.moving(bvh, observer.is_some())?;
     let jobs = Jobs::new(tiles.div_ceil(group), Phase::Log, job.monitor);
     let workers = jobs.run(|jobs| {
@@ -75,11 +76,8 @@ pub fn run(
             let range = index * group..tiles.min((index + 1) * group);
             for &tile in &job.todo[range] {
                 for batch in batches(job.tiles.window(tile), job.spp) {
-                    pending.samples.extend(
-                        batch
-                            .filter(|&sample| selection.takes(sample))
-                            .map(|sample| (tile, sample)),
-                    );
+                    let taken = batch.filter(|&sample| selection.takes(sample));
+                    pending.samples.extend(taken.map(|sample| (tile, sample)));
                     if pending.samples.len() >= BATCH {
                         pending.trace(job, &mut tracer, &mut integrator);
                         if jobs.is_cancelled() {
@@ -105,17 +103,14 @@ pub fn run(
         }
         (found, start.elapsed())
     })?;
-    for ((counts, sample), busy) in workers {
-        prepass.busy += busy;
-        prepass.counts.add(&counts);
+    for ((of_thread, sample), time) in workers {
+        busy += time;
+        counts.add(&of_thread);
         if let Some(sample) = sample {
             sum.merge(sample);
         }
     }
-    prepass.radiance = radiance
-        .into_inner()
-        .unwrap_or_else(PoisonError::into_inner);
-    Ok((prepass, sum))
+    Ok((prepass(radiance, counts, busy), sum))
 }
 
 /// Number of tiles of one job of a thread.

@@ -103,18 +103,8 @@ fn rounds(
 ) -> Result<Image, Error> {
     let live = job.monitor.tiles();
     let live = live.filter(|live| live.window() == job.rules.window);
-    let tiles = job.tiles.count();
     if growth.groups.is_empty() {
-        let size = (tiles / (4 * rayon::current_num_threads())).clamp(1, GROUP);
-        let anew = |index| {
-            let window = job.tiles.window(index);
-            (index, TileWork::new(job.rules, window, options.cost_map))
-        };
-        growth.groups = (0..tiles)
-            .step_by(size)
-            .map(|first| Mutex::new((first..tiles.min(first + size)).map(anew).collect()))
-            .collect();
-        growth.round.spp = job.spp;
+        growth.begin(job, options.cost_map);
     }
     let Growth {
         groups,
@@ -133,12 +123,12 @@ fn rounds(
                 false => Observe::Nothing,
             };
             let stop = || jobs.is_cancelled();
+            let tracer = Tracer::new(&tree.bvh, observe).until(&stop);
             let mut thread = Thread {
                 job,
                 live,
                 costs: options.cost_map,
-                tracer: (Tracer::new(&tree.bvh, observe).until(&stop))
-                    .moving(job.world, moving.as_ref()),
+                tracer: tracer.moving(job.world, moving.as_ref()),
                 integrator: Integrator::new(job.world),
                 samples: Vec::new(),
                 batch: Batch::default(),
@@ -176,6 +166,20 @@ fn rounds(
 }
 
 impl Growth {
+    /// Makes groups of tiles without samples.
+    fn begin(&mut self, job: &Job, cost_map: bool) {
+        let tiles = job.tiles.count();
+        let size = (tiles / (4 * rayon::current_num_threads())).clamp(1, GROUP);
+        let anew = |index| {
+            let window = job.tiles.window(index);
+            (index, TileWork::new(job.rules, window, cost_map))
+        };
+        let group = |first: usize| (first..tiles.min(first + size)).map(anew).collect();
+        let firsts = (0..tiles).step_by(size);
+        self.groups = firsts.map(|first| Mutex::new(group(first))).collect();
+        self.round.spp = job.spp;
+    }
+
     /// Picture of all tiles.
     fn image(self, job: &Job) -> Result<Image, Error> {
         let mut film = Film::new(job.rules);
@@ -247,14 +251,8 @@ impl Thread<'_> {
         for (index, tile) in tiles {
             let window = job.tiles.window(*index);
             for _ in 0..window.area() * depth as usize {
-                let [x, y] = self.samples[traced].pixel;
-                if let Some(costs) = &mut tile.costs {
-                    let place =
-                        (y - window.y0) as usize * window.width() + (x - window.x0) as usize;
-                    costs[place].add(&self.batch.costs[traced]);
-                }
-                let inside = self.batch.inside[traced];
-                tile.film.add([x, y], inside, self.batch.radiance(traced));
+                let pixel = self.samples[traced].pixel;
+                tile.add(window, pixel, &self.batch, traced);
                 traced += 1;
             }
             tile.done += depth;

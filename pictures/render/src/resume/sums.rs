@@ -7,7 +7,7 @@ use antumbra_image::Window;
 use serde::{Deserialize, Serialize};
 
 use crate::film::{Film, Rules, TileFilm};
-use crate::integrator::{Counts, SampleCost};
+use crate::integrator::{Batch, Counts, SampleCost};
 
 /// Effort of some work.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
@@ -51,6 +51,16 @@ impl TileWork {
             costs: costs.then(|| vec![SampleCost::default(); window.area()]),
             effort: Effort::default(),
         }
+    }
+
+    /// Adds sample `index` of a batch, of this pixel of the tile's `window`.
+    pub fn add(&mut self, window: Window, [x, y]: [i32; 2], batch: &Batch, index: usize) {
+        if let Some(costs) = &mut self.costs {
+            let (row, column) = ((y - window.y0) as usize, (x - window.x0) as usize);
+            costs[row * window.width() + column].add(&batch.costs[index]);
+        }
+        let inside = batch.inside[index];
+        self.film.add([x, y], inside, batch.radiance(index));
     }
 }
 

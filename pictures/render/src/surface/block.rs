@@ -14,26 +14,20 @@ use super::origin_offset::{self, EDGE_ERRORS, Room, offset, offset_distance};
 use super::point::{on_sphere, start_inside};
 use super::shapes::Shapes;
 use super::triangle::{Plane, edge_distance, interpolate, oriented, sides};
-use crate::columns::{BLOCK, Column, Column3, Flags, Stage, columns, run};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, columns, run, zero};
 
-/// Surfaces of a block of hits.
-#[derive(Clone, Debug)]
-pub struct SurfaceBlock {
-    found: Found,
-    surfaces: Surfaces,
-    /// Shape of each lane.
-    pub hit: [ShapeHit; BLOCK],
-}
-
-impl Default for SurfaceBlock {
-    fn default() -> Self {
-        Self {
-            found: Found::default(),
-            surfaces: Surfaces::default(),
-            hit: [ShapeHit::default(); BLOCK],
-        }
+columns! {
+    /// Surfaces of a block of hits.
+    #[derive(Clone, Debug)]
+    pub struct SurfaceBlock {
+        found: Found,
+        surfaces: Surfaces,
+        /// Shape of each lane.
+        pub hit: [ShapeHit; BLOCK],
     }
 }
+
+zero!(Found ShapeHit);
 
 /// Part of the scene that was hit.
 #[derive(Clone, Copy, Debug, Default)]

@@ -216,6 +216,27 @@ fn fraction(point: Vec3) -> f32 {
     (hash >> 8) as f32 * (1.0 / (1 << 24) as f32)
 }
 
+/// Value between those of the corners of the unit square.
+fn bilinear<T: Value>(corners: &[T; 4], Vec2 { x: s, y: t }: Vec2) -> T {
+    corners[0] * ((1.0 - s) * (1.0 - t))
+        + corners[1] * ((1.0 - s) * t)
+        + corners[2] * (s * (1.0 - t))
+        + corners[3] * (s * t)
+}
+
+fn noisy<T: Value>(pattern: &NoisePattern, at: &Footprint) -> T {
+    match *pattern {
+        NoisePattern::Fbm(octaves) => T::grey(noise::fbm(at, octaves)),
+        NoisePattern::Wrinkled(octaves) => T::grey(noise::turbulence(at, octaves)),
+        NoisePattern::Windy => T::grey(noise::windy(at)),
+        NoisePattern::Marble {
+            octaves,
+            scale,
+            variation,
+        } => T::of(noise::marble(&at.scaled(scale), octaves, variation)),
+    }
+}
+
 impl<T: Value> Texture<T> {
     /// Value at a place.
     pub fn at(&self, place: &Place) -> T {
@@ -247,13 +268,7 @@ impl<T: Value> Texture<T> {
                 cubes,
                 cube_is_second(texture_from_world.project_point3(place.point)),
             ),
-            Self::Bilerp { corners, mapping } => {
-                let Vec2 { x: s, y: t } = mapping.at(place).st;
-                corners[0] * ((1.0 - s) * (1.0 - t))
-                    + corners[1] * ((1.0 - s) * t)
-                    + corners[2] * (s * (1.0 - t))
-                    + corners[3] * (s * t)
-            }
+            Self::Bilerp { corners, mapping } => bilinear(corners, mapping.at(place).st),
             Self::Dots { dots, mapping } => choose(dots, noise::is_in_dot(mapping.at(place).st)),
             Self::Uv(mapping) => {
                 let st = mapping.at(place).st;
@@ -261,23 +276,13 @@ impl<T: Value> Texture<T> {
             }
             Self::Noise {
                 pattern,
-                texture_from_world,
+                texture_from_world: matrix,
             } => {
                 let at = Footprint {
-                    point: texture_from_world.project_point3(place.point),
-                    steps: (place.point_steps)
-                        .map(|step| texture_from_world.transform_vector3(step)),
+                    point: matrix.project_point3(place.point),
+                    steps: (place.point_steps).map(|step| matrix.transform_vector3(step)),
                 };
-                match *pattern {
-                    NoisePattern::Fbm(octaves) => T::grey(noise::fbm(&at, octaves)),
-                    NoisePattern::Wrinkled(octaves) => T::grey(noise::turbulence(&at, octaves)),
-                    NoisePattern::Windy => T::grey(noise::windy(&at)),
-                    NoisePattern::Marble {
-                        octaves,
-                        scale,
-                        variation,
-                    } => T::of(noise::marble(&at.scaled(scale), octaves, variation)),
-                }
+                noisy(pattern, &at)
             }
             Self::Image {
                 pyramid,

@@ -8,34 +8,38 @@ use glam::Vec3;
 use super::super::Batch;
 use super::super::arrival::Points;
 use super::{Hits, Origin, Paths, Surface, World, emitted_light, shade};
-use crate::columns::{BLOCK, Column, Column3, Flags, Stage, run};
+use crate::columns::{BLOCK, Column, Column3, Flags, Stage, columns, run, zero};
 use crate::light::Asked;
 use crate::material::Material;
 use crate::material::bsdf::Bsdf;
 use crate::sampler::StreamBlock;
 use crate::surface::{Frame, SurfaceBlock, Surfaces};
 
-/// Vertices of a block of paths, in columns.
-#[derive(Debug)]
-pub struct Vertices {
-    count: usize,
-    /// Number of lanes that scatter.
-    alive: usize,
-    /// Whether the lane is a Lambert reflector, computed in vectors.
-    pub is_lambert: Flags,
-    /// Lanes of all other vertices, with their BSDFs.
-    pub others: Vec<Other>,
-    /// BSDFs of the vertices whose material varies.
-    made: Vec<Bsdf>,
-    /// Number of the sample in the batch.
-    pub sample: Flags,
-    pub throughput: Column3,
-    pub expansion: Column,
-    /// Reflectance of Lambert reflectors.
-    pub reflectance: Column3,
-    pub streams: StreamBlock,
-    pub local: Local,
+columns! {
+    /// Vertices of a block of paths, in columns.
+    #[derive(Debug)]
+    pub struct Vertices {
+        count: usize,
+        /// Number of lanes that scatter.
+        alive: usize,
+        /// Whether the lane is a Lambert reflector, computed in vectors.
+        pub is_lambert: Flags,
+        /// Lanes of all other vertices, with their BSDFs.
+        pub others: Vec<Other>,
+        /// BSDFs of the vertices whose material varies.
+        made: Vec<Bsdf>,
+        /// Number of the sample in the batch.
+        pub sample: Flags,
+        pub throughput: Column3,
+        pub expansion: Column,
+        /// Reflectance of Lambert reflectors.
+        pub reflectance: Column3,
+        pub streams: StreamBlock,
+        pub local: Local,
+    }
 }
+
+zero!(StreamBlock Local);
 
 /// A vertex that is no Lambert reflector.
 #[derive(Clone, Copy, Debug)]
@@ -69,24 +73,6 @@ impl Local {
             column.set(lane, axis);
         }
         self.wo.set(lane, frame.to_local(wo));
-    }
-}
-
-impl Default for Vertices {
-    fn default() -> Self {
-        Self {
-            count: 0,
-            alive: 0,
-            is_lambert: [0; BLOCK],
-            others: Vec::new(),
-            made: Vec::new(),
-            sample: [0; BLOCK],
-            throughput: Column3::default(),
-            expansion: [0.0; BLOCK],
-            reflectance: Column3::default(),
-            streams: StreamBlock::default(),
-            local: Local::default(),
-        }
     }
 }
 

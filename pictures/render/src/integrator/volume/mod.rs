@@ -18,13 +18,13 @@ mod wander;
 use antumbra::Ray;
 use glam::Vec3;
 
+use super::Batch;
 use super::hits::Hits;
 use super::path::{DIRECTION, LIGHT, LIGHT_CHOICE, LOBE, ROULETTE, ROULETTE_DEPTH};
 use super::path::{
     Origin, Paths, draw, emitted_light, escaped_light, first_dimension, receiver, shade,
 };
 use super::tracer::Tracer;
-use super::{Batch, power_heuristic};
 use crate::light::{LightSample, Receiver};
 use crate::material::Material;
 use crate::material::bsdf::Bsdf;
@@ -185,11 +185,7 @@ impl VolumePathTracer {
             let wi = frame.to_local(light.wi);
             let found = bsdf.evaluate(wo, wi, surface.faces_same_side(light.wi));
             let density = light.pdf * chance;
-            let technique = if light.is_delta {
-                1.0
-            } else {
-                power_heuristic(density, found.pdf * (1.0 - delta_share))
-            };
+            let technique = light.technique(density, found.pdf * (1.0 - delta_share));
             let brought = found.value * light.radiance * (wi.z.abs() * technique / density);
             self.connections.push(Connection {
                 ray: light.shadow_ray(surface),
@@ -244,11 +240,7 @@ impl VolumePathTracer {
         if let Some((light, chance)) = light_sample(world, &at, &stream, dimension) {
             let value = phase::density(medium.asymmetry, dir.dot(light.wi));
             let density = light.pdf * chance;
-            let technique = if light.is_delta {
-                1.0
-            } else {
-                power_heuristic(density, value)
-            };
+            let technique = light.technique(density, value);
             let brought = light.radiance * (value * technique / density);
             self.connections.push(Connection {
                 ray: light.ray_from(point, world.shapes.origin_offset),

@@ -7,8 +7,8 @@ use std::f32::consts::{FRAC_1_PI, PI};
 use antumbra::Ray;
 use glam::Vec3;
 
+use super::super::Batch;
 use super::super::path::{DIRECTION, Origin, first_dimension};
-use super::super::{Batch, power_heuristic};
 use super::connections::Connection;
 use super::{State, VolumePathTracer, light_sample, medium_beyond};
 use crate::light::Receiver;
@@ -157,11 +157,7 @@ impl VolumePathTracer {
             let cos = light.wi.dot(normal);
             if cos > 0.0 && light.wi.dot(outward) > 0.0 {
                 let density = light.pdf * chance;
-                let technique = if light.is_delta {
-                    1.0
-                } else {
-                    power_heuristic(density, cos * FRAC_1_PI)
-                };
+                let technique = light.technique(density, cos * FRAC_1_PI);
                 let value = interface.leaving(cos);
                 let brought = light.radiance * (value * cos * technique / density);
                 self.connections.push(Connection {

@@ -253,35 +253,39 @@ impl Fourier {
             true => width * (value(place + 2) - f0) / (cosines[place + 2] - x0),
             false => f1 - f0,
         };
-        // As if it were linear, then by Newton's method in an interval that shrinks.
-        let mut t = match f0 == f1 {
-            true => rest / f0,
-            false => (f0 - (f0 * f0 + 2.0 * rest * (f1 - f0)).max(0.0).sqrt()) / (f0 - f1),
-        };
-        let (mut low, mut high) = (0.0, 1.0);
-        loop {
-            if !(low..=high).contains(&t) {
-                t = 0.5 * (low + high);
-            }
-            let cubic = -2.0 * d0 - d1;
-            let integral = t
-                * (f0
-                    + t * (0.5 * d0
-                        + t * (cubic / 3.0 + f1 - f0 + t * (0.25 * (d0 + d1) + 0.5 * (f0 - f1)))));
-            let value =
-                f0 + t * (d0 + t * (cubic + 3.0 * (f1 - f0) + t * (d0 + d1 + 2.0 * (f0 - f1))));
-            let off = integral - rest;
-            if off.abs() < 1e-6 || high - low < 1e-6 {
-                break;
-            }
-            if off < 0.0 {
-                low = t;
-            } else {
-                high = t;
-            }
-            t -= off / value;
-        }
+        let t = place_of([f0, f1], [d0, d1], rest);
         Some((x0 + width * t).clamp(cosines[0], cosines[count - 1]))
+    }
+}
+
+/// Place from 0 to 1 at which the integral of a cubic, by its values and slopes at the ends, is as `wanted`.
+fn place_of([f0, f1]: [f32; 2], [d0, d1]: [f32; 2], wanted: f32) -> f32 {
+    // As if it were linear, then by Newton's method in an interval that shrinks.
+    let mut t = match f0 == f1 {
+        true => wanted / f0,
+        false => (f0 - (f0 * f0 + 2.0 * wanted * (f1 - f0)).max(0.0).sqrt()) / (f0 - f1),
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    loop {
+        if !(low..=high).contains(&t) {
+            t = 0.5 * (low + high);
+        }
+        let cubic = -2.0 * d0 - d1;
+        let integral = t
+            * (f0
+                + t * (0.5 * d0
+                    + t * (cubic / 3.0 + f1 - f0 + t * (0.25 * (d0 + d1) + 0.5 * (f0 - f1)))));
+        let value = f0 + t * (d0 + t * (cubic + 3.0 * (f1 - f0) + t * (d0 + d1 + 2.0 * (f0 - f1))));
+        let off = integral - wanted;
+        if off.abs() < 1e-6 || high - low < 1e-6 {
+            return t;
+        }
+        if off < 0.0 {
+            low = t;
+        } else {
+            high = t;
+        }
+        t -= off / value;
     }
 }
 
