@@ -185,7 +185,7 @@ pub(crate) fn decode(bytes: &[u8], claim: &mut Claim) -> Result<Image, String> {
     Image::new(display.width(), display.height(), window, pixels).map_err(|error| error.to_string())
 }
 
-/// Channels of colours, and of luminance alone.
+/// Channels of colours, and of luminance by itself.
 const RGB: [&str; 3] = ["R", "G", "B"];
 const LUMINANCE: [&str; 3] = ["Y"; 3];
 

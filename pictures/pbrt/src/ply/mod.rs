@@ -182,7 +182,7 @@ pub struct ColoredPly {
 
 /// What a caller wants of a file.
 struct Wanted {
-    /// Most memory for the file and its mesh, or for the mesh alone where the bytes are there.
+    /// Most memory for the file and its mesh, or only for the mesh where the bytes are there.
     max_bytes: u64,
     colors: bool,
     /// Point from which positions are measured before they are rounded.

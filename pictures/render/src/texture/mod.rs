@@ -216,7 +216,7 @@ fn fraction(point: Vec3) -> f32 {
     (hash >> 8) as f32 * (1.0 / (1 << 24) as f32)
 }
 
-/// Value between those of the corners of the unit square.
+/// Value between the values at the corners of the unit square.
 fn bilinear<T: Value>(corners: &[T; 4], Vec2 { x: s, y: t }: Vec2) -> T {
     corners[0] * ((1.0 - s) * (1.0 - t))
         + corners[1] * ((1.0 - s) * t)
