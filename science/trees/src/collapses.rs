@@ -11,14 +11,10 @@ use antumbra::recipe::{Collapse, UnknownName};
 use crate::{find, rows};
 
 rows! {
-    Unsorted = "learned-unsorted", "The nodes of `learned`, whose children stay in the order of the binary tree: for ablations", None;
-    Rsc = "rsc", "Children that training rays visit most are opened first", Some("Gu, He and Blelloch 2015");
+    Collapse;
+    LEARNED_UNSORTED Unsorted = "learned-unsorted", "The nodes of `learned`, whose children stay in the order of the binary tree: for ablations", None;
+    RSC Rsc = "rsc", "Children that training rays visit most are opened first", Some("Gu, He and Blelloch 2015");
 }
-
-/// The nodes of [`Collapse::Learned`], whose children stay in the order of the binary tree.
-pub const LEARNED_UNSORTED: Collapse = Collapse::Other(&Unsorted);
-/// Ray specialized contraction (Gu, He and Blelloch 2015).
-pub const RSC: Collapse = Collapse::Other(&Rsc);
 
 /// Collapses of the kernel and of this crate.
 pub const COLLAPSES: [Collapse; 5] = [

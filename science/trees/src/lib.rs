@@ -49,11 +49,13 @@ fn find<T: Copy>(
     })
 }
 
-/// Declares rows of a list: a type each, and what the list says of it.
+/// Declares rows of a list: a type and a constant each, and what the list says of it.
 macro_rules! rows {
-    ($($Type:ident = $name:literal, $sentence:literal, $source:expr;)*) => {
+    ($List:ident; $($ROW:ident $Type:ident = $name:literal, $sentence:literal, $source:expr;)*) => {
         $(
             #[doc = concat!($sentence, ".")]
+            pub const $ROW: $List = $List::Other(&$Type);
+
             struct $Type;
 
             impl antumbra::parts::Row for $Type {

@@ -87,6 +87,51 @@ impl Candidates {
     }
 }
 
+/// Items divided in two.
+pub(crate) struct Split {
+    pub cost: f64,
+    pub is_left: Vec<bool>,
+    /// What is around either side.
+    pub bounds: [Aabb; 2],
+}
+
+impl Split {
+    /// The items of either side.
+    pub fn sides<T>(&self, items: impl IntoIterator<Item = T>) -> [Vec<T>; 2] {
+        let mut sides = [Vec::new(), Vec::new()];
+        for (item, is_left) in items.into_iter().zip(&self.is_left) {
+            sides[usize::from(!is_left)].push(item);
+        }
+        sides
+    }
+}
+
+/// The cheapest split of all axes, the first of equals, with what else is known of it. `costs` returns the costs of
+/// [`Candidates::splits`], in their order.
+pub(crate) fn cheapest<T>(
+    boxes: &[Aabb],
+    costs: impl Fn(&Candidates) -> Vec<(f64, T)>,
+) -> Option<(Split, T)> {
+    let mut best: Option<(Split, T)> = None;
+    for candidates in (0..3).filter_map(|axis| Candidates::new(boxes, axis)) {
+        for (split, (cost, more)) in candidates.splits().zip(costs(&candidates)) {
+            if cost < best.as_ref().map_or(f64::INFINITY, |(best, _)| best.cost) {
+                let is_left = |bin: &u8| usize::from(*bin) < split;
+                let best_split = Split {
+                    cost,
+                    is_left: candidates.bins.iter().map(is_left).collect(),
+                    bounds: [
+                        candidates.left[split].bounds,
+                        candidates.right[split].bounds,
+                    ],
+                };
+                best = Some((best_split, more));
+            }
+        }
+    }
+    best
+}
+
 /// The centre on an axis, by halves that cannot overflow when added.
 pub(crate) fn center(bounds: &Aabb, axis: usize) -> f32 {
     0.5 * bounds.min[axis] + 0.5 * bounds.max[axis]

@@ -18,40 +18,24 @@ use antumbra::recipe::{Builder, UnknownName};
 use antumbra::{Primitives, Ray};
 use rayon::prelude::*;
 
-use self::ray_driven::evidence::AllEvidence;
 use self::ray_driven::rdh::RdhCost;
 use self::ray_driven::seen::Seen;
 use self::ray_driven::srdh::SrdhCost;
 use self::ray_driven::vdbvh;
+use self::ray_driven::{Levels, SplitCost};
 use crate::{find, rows};
 
 rows! {
-    Pbrt = "pbrt", "Object splits over 12 buckets, leaves of at most 4 and only where cheaper, as in pbrt-v3", Some("Pharr, Jakob and Humphreys 2016");
-    Pbrt2015 = "pbrt-2015", "As `pbrt`, with one primitive in a leaf, as in pbrt-v3 until November 2015", Some("Pharr, Jakob and Humphreys 2016");
-    Ploc = "ploc", "Neighbours on a space-filling curve merged, the nearest first", Some("Meister and Bittner 2018");
-    PlocReinsertion = "ploc-reinsertion", "PLOC, then subtrees moved to better places", Some("Meister and Bittner 2018");
-    Sbvh = "sbvh", "Spatial splits beside object splits: a primitive may be in several leaves", Some("Stich, Friedrich and Dietrich 2009");
-    Rdh = "rdh", "Object splits by how many training rays enter the boxes, blended with area", Some("Bittner and Havran 2009");
-    Srdh = "srdh", "Object splits by what training rays cost that stop at their first occluder", Some("Feltman, Lee and Fatahalian 2012");
-    Vdbvh = "vdbvh", "Object splits by how many primitives rays see, blended with area", Some("Vinkler, Havran and Sochor 2012");
+    Builder;
+    PBRT Pbrt = "pbrt", "Object splits over 12 buckets, leaves of at most 4 and only where cheaper, as in pbrt-v3", Some("Pharr, Jakob and Humphreys 2016");
+    PBRT_2015 Pbrt2015 = "pbrt-2015", "As `pbrt`, with one primitive in a leaf, as in pbrt-v3 until November 2015", Some("Pharr, Jakob and Humphreys 2016");
+    PLOC Ploc = "ploc", "Neighbours on a space-filling curve merged, the nearest first", Some("Meister and Bittner 2018");
+    PLOC_REINSERTION PlocReinsertion = "ploc-reinsertion", "PLOC, then subtrees moved to better places", Some("Meister and Bittner 2018");
+    SBVH Sbvh = "sbvh", "Spatial splits beside object splits: a primitive may be in several leaves", Some("Stich, Friedrich and Dietrich 2009");
+    RDH Rdh = "rdh", "Object splits by how many training rays enter the boxes, blended with area", Some("Bittner and Havran 2009");
+    SRDH Srdh = "srdh", "Object splits by what training rays cost that stop at their first occluder", Some("Feltman, Lee and Fatahalian 2012");
+    VDBVH Vdbvh = "vdbvh", "Object splits by how many primitives rays see, blended with area", Some("Vinkler, Havran and Sochor 2012");
 }
-
-/// The builder of pbrt-v3.
-pub const PBRT: Builder = Builder::Other(&Pbrt);
-/// The builder of pbrt-v3 until November 2015.
-pub const PBRT_2015: Builder = Builder::Other(&Pbrt2015);
-/// Parallel locally-ordered clustering (Meister and Bittner 2018).
-pub const PLOC: Builder = Builder::Other(&Ploc);
-/// [`PLOC`], then subtrees moved to better places.
-pub const PLOC_REINSERTION: Builder = Builder::Other(&PlocReinsertion);
-/// Spatial splits (Stich, Friedrich and Dietrich 2009).
-pub const SBVH: Builder = Builder::Other(&Sbvh);
-/// The ray distribution heuristic (Bittner and Havran 2009).
-pub const RDH: Builder = Builder::Other(&Rdh);
-/// The shadow ray distribution heuristic (Feltman, Lee and Fatahalian 2012).
-pub const SRDH: Builder = Builder::Other(&Srdh);
-/// Visibility driven builds (Vinkler, Havran and Sochor 2012).
-pub const VDBVH: Builder = Builder::Other(&Vdbvh);
 
 /// Builders of the kernel and of this crate.
 pub const BUILDERS: [Builder; 10] = [
@@ -89,77 +73,38 @@ fn each(
         .collect()
 }
 
-impl Grow for Pbrt {
-    fn grow(&self, primitives: &Primitives, _: &[Ray]) -> Vec<BinaryTree> {
-        each(primitives, |one, _| pbrt::build(one, pbrt::Rule::LATER))
-    }
+/// Says how the rows build, and what else is true of them.
+macro_rules! grow {
+    ($($Type:ident $($also:ident)?, |$primitives:ident, $rays:pat_param| $trees:expr;)*) => {$(
+        impl Grow for $Type {
+            $(fn $also(&self) -> bool {
+                true
+            })?
+
+            fn grow(&self, $primitives: &Primitives, $rays: &[Ray]) -> Vec<BinaryTree> {
+                $trees
+            }
+        }
+    )*};
 }
 
-impl Grow for Pbrt2015 {
-    fn grow(&self, primitives: &Primitives, _: &[Ray]) -> Vec<BinaryTree> {
-        each(primitives, |one, _| pbrt::build(one, pbrt::Rule::EARLIER))
-    }
+grow! {
+    Pbrt, |all, _| each(all, |one, _| pbrt::build(one, pbrt::Rule::LATER));
+    Pbrt2015, |all, _| each(all, |one, _| pbrt::build(one, pbrt::Rule::EARLIER));
+    Ploc, |all, _| each(all, |one, _| ploc::build(one));
+    PlocReinsertion reinserts, |all, rays| Ploc.grow(all, rays);
+    Sbvh, |all, _| each(all, |one, _| sbvh::build(one));
+    Rdh needs_rays, |all, rays| driven_by_rays(all, rays, &RdhCost::default());
+    Srdh needs_rays, |all, rays| driven_by_rays(all, rays, &SrdhCost::default());
+    Vdbvh needs_rays, |all, rays| {
+        let seen = Seen::sent(all, rays);
+        each(all, |one, place| vdbvh::build(one, seen.of(place), vdbvh::WEIGHT))
+    };
 }
 
-impl Grow for Ploc {
-    fn grow(&self, primitives: &Primitives, _: &[Ray]) -> Vec<BinaryTree> {
-        each(primitives, |one, _| ploc::build(one))
-    }
-}
-
-impl Grow for PlocReinsertion {
-    fn reinserts(&self) -> bool {
-        true
-    }
-
-    fn grow(&self, primitives: &Primitives, rays: &[Ray]) -> Vec<BinaryTree> {
-        Ploc.grow(primitives, rays)
-    }
-}
-
-impl Grow for Sbvh {
-    fn grow(&self, primitives: &Primitives, _: &[Ray]) -> Vec<BinaryTree> {
-        each(primitives, |one, _| sbvh::build(one))
-    }
-}
-
-impl Grow for Rdh {
-    fn needs_rays(&self) -> bool {
-        true
-    }
-
-    fn grow(&self, primitives: &Primitives, rays: &[Ray]) -> Vec<BinaryTree> {
-        let all = AllEvidence::new(primitives, rays);
-        let cost = RdhCost::default();
-        each(primitives, |one, place| {
-            ray_driven::build(one, all.of(place), &cost)
-        })
-    }
-}
-
-impl Grow for Srdh {
-    fn needs_rays(&self) -> bool {
-        true
-    }
-
-    fn grow(&self, primitives: &Primitives, rays: &[Ray]) -> Vec<BinaryTree> {
-        let all = AllEvidence::new(primitives, rays);
-        let cost = SrdhCost::default();
-        each(primitives, |one, place| {
-            ray_driven::build(one, all.of(place), &cost)
-        })
-    }
-}
-
-impl Grow for Vdbvh {
-    fn needs_rays(&self) -> bool {
-        true
-    }
-
-    fn grow(&self, primitives: &Primitives, rays: &[Ray]) -> Vec<BinaryTree> {
-        let seen = Seen::new(primitives, rays);
-        each(primitives, |one, place| {
-            vdbvh::build(one, seen.of(place), vdbvh::WEIGHT)
-        })
-    }
+fn driven_by_rays(primitives: &Primitives, rays: &[Ray], cost: &impl SplitCost) -> Vec<BinaryTree> {
+    let all = Levels::followed(primitives, rays);
+    each(primitives, |one, place| {
+        ray_driven::build(one, all.of(place), cost)
+    })
 }

@@ -117,15 +117,10 @@ impl Plan<'_> {
             items.sort_by(|a, b| a.center[axis].total_cmp(&b.center[axis]));
             right = items.split_off(count / 2);
         }
-        let (left, right) = if count > SEQUENTIAL {
-            rayon::join(
-                || self.piece(items, depth + 1),
-                || self.piece(right, depth + 1),
-            )
-        } else {
-            (self.piece(items, depth + 1), self.piece(right, depth + 1))
-        };
-        Piece::parent(bounds, left, right)
+        let is_large = count > SEQUENTIAL;
+        Piece::of_parts(bounds, [items, right], is_large, |items| {
+            self.piece(items, depth + 1)
+        })
     }
 
     fn leaf(&self, items: &[Item], depth: u32) -> Piece {

@@ -24,7 +24,7 @@ impl Piece {
     }
 
     /// A node with two children.
-    pub fn parent(bounds: Aabb, left: Self, right: Self) -> Self {
+    fn parent(bounds: Aabb, left: Self, right: Self) -> Self {
         let kind = BinaryKind::Inner {
             right: 1 + left.nodes.len() as u32,
         };
@@ -41,6 +41,20 @@ impl Piece {
         let mut prims = left.prims;
         prims.extend(right.prims);
         Self { nodes, prims }
+    }
+
+    /// A node whose children are built from two parts, at the same time if these are large.
+    pub fn of_parts<T: Send>(
+        bounds: Aabb,
+        [left, right]: [T; 2],
+        are_large: bool,
+        build: impl Fn(T) -> Self + Sync,
+    ) -> Self {
+        let (left, right) = match are_large {
+            true => rayon::join(|| build(left), || build(right)),
+            false => (build(left), build(right)),
+        };
+        Self::parent(bounds, left, right)
     }
 
     /// The whole tree.

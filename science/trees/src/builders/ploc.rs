@@ -205,13 +205,10 @@ impl Forest<'_> {
             self.gather(name, &mut prims);
             return Piece::leaf(merger.bounds, prims);
         }
-        let [left, right] = merger.children;
-        let (left, right) = if merger.count > SEQUENTIAL {
-            rayon::join(|| self.piece(left), || self.piece(right))
-        } else {
-            (self.piece(left), self.piece(right))
-        };
-        Piece::parent(merger.bounds, left, right)
+        let is_large = merger.count > SEQUENTIAL;
+        Piece::of_parts(merger.bounds, merger.children, is_large, |child| {
+            self.piece(child)
+        })
     }
 
     /// The primitives of a cluster.

@@ -11,17 +11,11 @@ use antumbra::recipe::{CostModel, Order, UnknownName};
 use crate::{find, rows};
 
 rows! {
-    Random = "random", "A random permutation for each node: what the others have to beat", None;
-    Ftob = "ftob", "Front to back by entry distance, decided for every ray", None;
-    Rtsah = "rtsah", "Least cost for uniform rays", Some("Ize and Hansen 2011");
+    Order;
+    RANDOM Random = "random", "A random permutation for each node: what the others have to beat", None;
+    FTOB Ftob = "ftob", "Front to back by entry distance, decided for every ray", None;
+    RTSAH Rtsah = "rtsah", "Least cost for uniform rays", Some("Ize and Hansen 2011");
 }
-
-/// A random permutation for each node.
-pub const RANDOM: Order = Order::Other(&Random);
-/// Front to back, decided for every ray.
-pub const FTOB: Order = Order::Other(&Ftob);
-/// The ray termination surface area heuristic (Ize and Hansen 2011).
-pub const RTSAH: Order = Order::Other(&Rtsah);
 
 /// Child orders of the kernel and of this crate.
 pub const ORDERS: [Order; 11] = [

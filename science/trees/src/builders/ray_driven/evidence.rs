@@ -3,6 +3,7 @@
 //! The rays are followed to their ends through a tree of binned SAH, so every primitive that they hit is
 //! known, not only the nearest. An object has the rays of all its instances.
 
+use super::Levels;
 use antumbra::Primitives;
 use antumbra::Ray;
 use antumbra::parts::BinaryTree;
@@ -28,17 +29,11 @@ pub(crate) struct Evidence {
     pub hits: Vec<(u32, u32)>,
 }
 
-/// Rays on both levels, and their hits.
-pub(crate) struct AllEvidence {
-    /// Rays and hits of primitives in the world itself.
-    pub world: Evidence,
-    pub objects: Vec<Evidence>,
-}
-
-impl AllEvidence {
+impl Levels<Evidence> {
     /// Follows the rays. Those that cannot hit anything are left out.
-    pub fn new(primitives: &Primitives, rays: &[Ray]) -> Self {
-        let mut all = Self::none(primitives);
+    pub fn followed(primitives: &Primitives, rays: &[Ray]) -> Self {
+        let nothing = || Self::new(primitives, |_| Evidence::default());
+        let mut all = nothing();
         if rays.is_empty() || primitives.is_empty() {
             return all;
         }
@@ -46,7 +41,7 @@ impl AllEvidence {
         let stride = rays.len().div_ceil(MOST_RAYS);
         let rays: Vec<_> = rays.iter().copied().step_by(stride).collect();
         let chunks = rays.par_chunks(CHUNK).map(|rays| {
-            let mut all = Self::none(primitives);
+            let mut all = nothing();
             let Self { world, objects } = &mut all;
             follow(primitives, &tree, rays, world, objects);
             all
@@ -60,22 +55,6 @@ impl AllEvidence {
             }
         }
         all
-    }
-
-    /// The rays of the world, or of an object, which are number 1 and up.
-    pub fn of(&self, place: usize) -> &Evidence {
-        place
-            .checked_sub(1)
-            .map_or(&self.world, |object| &self.objects[object])
-    }
-
-    /// No rays.
-    pub fn none(primitives: &Primitives) -> Self {
-        let objects = primitives.object_list().iter();
-        Self {
-            world: Evidence::default(),
-            objects: objects.map(|_| Evidence::default()).collect(),
-        }
     }
 }
 

@@ -11,7 +11,7 @@ pub(crate) mod seen;
 pub(crate) mod srdh;
 pub(crate) mod vdbvh;
 
-use crate::builders::candidates::Candidates;
+use crate::builders::candidates::{Candidates, Split, cheapest};
 use crate::builders::pieces::Piece;
 use crate::builders::ray_driven::evidence::Evidence;
 use antumbra::Aabb;
@@ -89,6 +89,29 @@ pub(crate) fn build(
     plan.piece(root).into_tree()
 }
 
+/// What rays find out about the world's own primitives, and about each object in all of its instances.
+pub(crate) struct Levels<T> {
+    pub world: T,
+    pub objects: Vec<T>,
+}
+
+impl<T> Levels<T> {
+    /// Levels about which nothing is known yet.
+    pub fn new(primitives: &Primitives, nothing: impl Fn(&Primitives) -> T) -> Self {
+        let objects = primitives.object_list().iter();
+        Self {
+            world: nothing(primitives),
+            objects: objects.map(&nothing).collect(),
+        }
+    }
+
+    /// The world, or an object, which are number 1 and up.
+    pub fn of(&self, place: usize) -> &T {
+        let object = place.checked_sub(1);
+        object.map_or(&self.world, |object| &self.objects[object])
+    }
+}
+
 /// Primitives that become a subtree.
 struct Node {
     /// Ascending.
@@ -104,15 +127,6 @@ struct Plan<'a, C> {
     primitives: &'a Primitives,
     evidence: &'a Evidence,
     cost: &'a C,
-}
-
-/// The split that is made.
-struct Split {
-    cost: f64,
-    /// Per primitive of the node, whether it goes left.
-    is_left: Vec<bool>,
-    bounds: [Aabb; 2],
-    right_first: bool,
 }
 
 impl<C: SplitCost> Plan<'_, C> {
@@ -131,22 +145,16 @@ impl<C: SplitCost> Plan<'_, C> {
             .iter()
             .map(|prim| self.primitives.bounds_of(*prim as usize))
             .collect();
-        let Some(split) = self.best_split(&node, &boxes) else {
+        let Some((split, right_first)) = self.best_split(&node, &boxes) else {
             return Piece::from(binned_subtree(self.primitives, &node.prims, node.depth));
         };
         let size = node.prims.len() + node.rays.len();
-        let [left, right] = self.halves(node, &split);
-        let (left, right) = if size > SEQUENTIAL {
-            rayon::join(|| self.piece(left), || self.piece(right))
-        } else {
-            (self.piece(left), self.piece(right))
-        };
-        let bounds = split.bounds[0].union(&split.bounds[1]);
-        if split.right_first {
-            Piece::parent(bounds, right, left)
-        } else {
-            Piece::parent(bounds, left, right)
+        let mut halves = self.halves(node, &split);
+        if right_first {
+            halves.reverse();
         }
+        let bounds = split.bounds[0].union(&split.bounds[1]);
+        Piece::of_parts(bounds, halves, size > SEQUENTIAL, |half| self.piece(half))
     }
 
     fn halves(&self, node: Node, split: &Split) -> [Node; 2] {
@@ -154,39 +162,22 @@ impl<C: SplitCost> Plan<'_, C> {
             let place = node.prims.partition_point(|other| *other < prim);
             usize::from(!split.is_left[place])
         };
-        let mut prims = [Vec::new(), Vec::new()];
-        for (prim, is_left) in node.prims.iter().zip(&split.is_left) {
-            prims[usize::from(!is_left)].push(*prim);
-        }
+        let mut prims = split.sides(node.prims.iter().copied());
         let mut hits = [Vec::new(), Vec::new()];
         for &(ray, prim) in &node.hits {
             hits[side_of(prim)].push((ray, prim));
         }
-        let rays = split
-            .bounds
-            .map(|bounds| self.entering(node.rays.iter().copied(), &bounds));
-        let [left_prims, right_prims] = prims;
-        let [left_rays, right_rays] = rays;
-        let [left_hits, right_hits] = hits;
-        let depth = node.depth + 1;
-        [
-            Node {
-                prims: left_prims,
-                rays: left_rays,
-                hits: left_hits,
-                depth,
-            },
-            Node {
-                prims: right_prims,
-                rays: right_rays,
-                hits: right_hits,
-                depth,
-            },
-        ]
+        [0, 1].map(|side| Node {
+            prims: std::mem::take(&mut prims[side]),
+            rays: self.entering(node.rays.iter().copied(), &split.bounds[side]),
+            hits: std::mem::take(&mut hits[side]),
+            depth: node.depth + 1,
+        })
     }
 
-    /// The split that costs least, the first of equals; `None` if there is none of finite cost.
-    fn best_split(&self, node: &Node, boxes: &[Aabb]) -> Option<Split> {
+    /// The split that costs least, the first of equals, and whether its right side comes first; `None` if there is none of
+    /// finite cost.
+    fn best_split(&self, node: &Node, boxes: &[Aabb]) -> Option<(Split, bool)> {
         let bounds = boxes.iter().fold(Aabb::EMPTY, |all, one| all.union(one));
         // Each hit by the place of its primitive in the node.
         let places: Vec<_> = node
@@ -202,30 +193,15 @@ impl<C: SplitCost> Plan<'_, C> {
             // Nothing reads it.
             until_hit: 0.0,
         };
-        let mut best: Option<Split> = None;
-        for axis in 0..3 {
-            let Some(candidates) = Candidates::new(boxes, axis) else {
-                continue;
+        cheapest(boxes, |candidates| {
+            let sides = self.sides(node, candidates, &places);
+            let judged = |split: usize| {
+                let [left, right] = &sides[split];
+                let right_first = self.cost.right_first(&parent, left, right);
+                (self.cost.of(&parent, left, right), right_first)
             };
-            let sides = self.sides(node, &candidates, &places);
-            for split in candidates.splits() {
-                let [left, right] = sides[split];
-                let cost = self.cost.of(&parent, &left, &right);
-                if cost < best.as_ref().map_or(f64::INFINITY, |best| best.cost) {
-                    let is_left = |bin: &u8| usize::from(*bin) < split;
-                    best = Some(Split {
-                        cost,
-                        is_left: candidates.bins.iter().map(is_left).collect(),
-                        bounds: [
-                            candidates.left[split].bounds,
-                            candidates.right[split].bounds,
-                        ],
-                        right_first: self.cost.right_first(&parent, &left, &right),
-                    });
-                }
-            }
-        }
-        best
+            candidates.splits().map(judged).collect()
+        })
     }
 
     /// Measures of the two sides of every split.

@@ -3,6 +3,7 @@
 //! Training rays are few, and most primitives of a large scene are on none of them. So every start sends further rays,
 //! into random directions of the half space of its training ray, until more of them find hardly anything new.
 
+use super::Levels;
 use antumbra::Primitives;
 use antumbra::Ray;
 use antumbra::parts::BinaryTree;
@@ -27,18 +28,13 @@ const CHUNK: usize = 256;
 /// Any seed does.
 const SEED: u64 = 2012;
 
-/// Primitives that are seen, by index.
-pub(crate) struct Seen {
-    /// Primitives of the world itself.
-    pub world: Vec<bool>,
-    /// Primitives of each object, seen in any of its instances.
-    pub objects: Vec<Vec<bool>>,
-}
+/// Whether each primitive is seen.
+pub(crate) type Seen = Levels<Vec<bool>>;
 
 impl Seen {
     /// Sends rays from where these rays start. Each level counts for itself: what an instance hides from the world's
     /// own primitives is not taken into account.
-    pub fn new(primitives: &Primitives, rays: &[Ray]) -> Self {
+    pub fn sent(primitives: &Primitives, rays: &[Ray]) -> Self {
         let mut all = Self::none(primitives);
         if rays.is_empty() || primitives.is_empty() {
             return all;
@@ -61,20 +57,9 @@ impl Seen {
         all
     }
 
-    /// Primitives of the world, or of an object, which are number 1 and up.
-    pub fn of(&self, place: usize) -> &[bool] {
-        place
-            .checked_sub(1)
-            .map_or(&self.world, |object| &self.objects[object])
-    }
-
     /// Nothing is seen.
     pub fn none(primitives: &Primitives) -> Self {
-        let objects = primitives.object_list().iter();
-        Self {
-            world: vec![false; primitives.len()],
-            objects: objects.map(|object| vec![false; object.len()]).collect(),
-        }
+        Self::new(primitives, |level| vec![false; level.len()])
     }
 
     fn count(&self) -> usize {

@@ -1,6 +1,5 @@
 //! Counts against counting; costs against the models they come from.
 
-use crate::builders::ray_driven::evidence::AllEvidence;
 use crate::builders::ray_driven::rdh::RdhCost;
 use crate::builders::ray_driven::seen::Seen;
 use crate::builders::ray_driven::srdh::SrdhCost;
@@ -21,7 +20,7 @@ fn sides_are_counted_exactly() {
         let mesh = mesh::soup(&mut rng, size);
         let primitives = primitives(&mesh, 5, &mut rng);
         let rays = surface_rays(&primitives, 200, 3);
-        let all = AllEvidence::new(&primitives, &rays);
+        let all = Levels::followed(&primitives, &rays);
         let evidence = &all.world;
         assert!(evidence.rays.len() == 200 && !evidence.hits.is_empty());
         let plan = Plan {
@@ -139,7 +138,7 @@ fn evidence_is_that_of_brute_force() {
     let primitives =
         Primitives::with_instances(&of_world, &[of_object], &instances).expect("indices in range");
     let rays = rays_between(&mut rng, 2000);
-    let all = AllEvidence::new(&primitives, &rays);
+    let all = Levels::followed(&primitives, &rays);
     assert_eq!(all.world.rays.len(), rays.len());
     let entered = all.objects[0].rays.len();
     assert!(entered > 100 && entered < rays.len() * instances.len());
@@ -218,7 +217,7 @@ fn ready(rays: &[Ray]) -> Vec<RaySetup> {
     let primitives = primitives.expect("a sphere");
     // So many at a time that all are used.
     for rays in rays.chunks(1 << 14) {
-        all.extend(AllEvidence::new(&primitives, rays).world.rays);
+        all.extend(Levels::followed(&primitives, rays).world.rays);
     }
     all
 }

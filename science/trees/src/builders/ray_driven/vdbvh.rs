@@ -9,7 +9,7 @@
 //! - Nodes in which nothing is seen are divided as finely as the others: answers need no visibility.
 
 use super::{MAX_DEPTH, SEQUENTIAL, area};
-use crate::builders::candidates::{Candidates, Part};
+use crate::builders::candidates::{Candidates, Part, Split, cheapest};
 use crate::builders::pieces::Piece;
 use antumbra::Aabb;
 use antumbra::Primitives;
@@ -49,13 +49,6 @@ struct Plan<'a> {
     cost: Cost,
 }
 
-/// The split that is made: for each primitive, whether it goes left, and the bounds of both sides together.
-pub(super) struct Split {
-    pub cost: f64,
-    pub is_left: Vec<bool>,
-    bounds: Aabb,
-}
-
 impl<'a> Plan<'a> {
     fn new(primitives: &'a Primitives, seen: &'a [bool], weight: f64) -> Self {
         Self {
@@ -76,20 +69,10 @@ impl<'a> Plan<'a> {
             return Piece::from(binned_subtree(self.primitives, &prims, depth));
         };
         let is_large = prims.len() > SEQUENTIAL;
-        let mut sides = [Vec::new(), Vec::new()];
-        for (prim, is_left) in prims.into_iter().zip(split.is_left) {
-            sides[usize::from(!is_left)].push(prim);
-        }
-        let [left, right] = sides;
-        let (left, right) = if is_large {
-            rayon::join(
-                || self.piece(left, depth + 1),
-                || self.piece(right, depth + 1),
-            )
-        } else {
-            (self.piece(left, depth + 1), self.piece(right, depth + 1))
-        };
-        Piece::parent(split.bounds, left, right)
+        let bounds = split.bounds[0].union(&split.bounds[1]);
+        Piece::of_parts(bounds, split.sides(prims), is_large, |side| {
+            self.piece(side, depth + 1)
+        })
     }
 
     /// The split that costs least, the first of equals; `None` if there is none of finite cost.
@@ -100,33 +83,22 @@ impl<'a> Plan<'a> {
             .collect();
         let bounds = boxes.iter().fold(Aabb::EMPTY, |all, one| all.union(one));
         let whole = seen.iter().filter(|seen| **seen).count();
-        let mut best: Option<Split> = None;
-        for axis in 0..3 {
-            let Some(candidates) = Candidates::new(&boxes, axis) else {
-                continue;
+        let split = cheapest(&boxes, |candidates| {
+            let left = seen_on_the_left(candidates, seen);
+            let side = |part: &Part, seen: usize| {
+                let share = area(&part.bounds) / area(&bounds);
+                let share = if share.is_finite() { share } else { 1.0 };
+                let chance = self.weight * seen as f64 / whole as f64 + (1.0 - self.weight) * share;
+                chance * f64::from(self.cost.weight_of(part.count))
             };
-            let left = seen_on_the_left(&candidates, seen);
-            for split in candidates.splits() {
-                let side = |part: &Part, seen: usize| {
-                    let share = area(&part.bounds) / area(&bounds);
-                    let share = if share.is_finite() { share } else { 1.0 };
-                    let chance =
-                        self.weight * seen as f64 / whole as f64 + (1.0 - self.weight) * share;
-                    chance * f64::from(self.cost.weight_of(part.count))
-                };
-                let cost = side(&candidates.left[split], left[split])
-                    + side(&candidates.right[split], whole - left[split]);
-                if cost < best.as_ref().map_or(f64::INFINITY, |best| best.cost) {
-                    let is_left = |bin: &u8| usize::from(*bin) < split;
-                    best = Some(Split {
-                        cost,
-                        is_left: candidates.bins.iter().map(is_left).collect(),
-                        bounds,
-                    });
-                }
-            }
-        }
-        best
+            let cost = |split: usize| {
+                side(&candidates.left[split], left[split])
+                    + side(&candidates.right[split], whole - left[split])
+            };
+            let splits = candidates.splits();
+            splits.map(|split| (cost(split), ())).collect()
+        });
+        split.map(|(split, ())| split)
     }
 }
 

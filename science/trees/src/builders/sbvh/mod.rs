@@ -14,7 +14,7 @@
 pub(crate) mod clip;
 mod spatial_bins;
 
-use crate::builders::candidates::{Candidates, center};
+use crate::builders::candidates::{Candidates, Part, Split, center, cheapest};
 use crate::builders::pieces::Piece;
 use crate::builders::sbvh::clip::within;
 use crate::builders::sbvh::spatial_bins::{Reference, SpatialSplit, best_plane};
@@ -66,13 +66,6 @@ struct Plan<'a> {
     least_overlap: f32,
 }
 
-/// A split between primitives.
-struct ObjectSplit {
-    cost: f32,
-    is_left: Vec<bool>,
-    bounds: [Aabb; 2],
-}
-
 impl Plan<'_> {
     /// The subtree over some references, to which so many may be added.
     fn piece(&self, references: Vec<Reference>, budget: usize, depth: usize) -> Piece {
@@ -95,14 +88,10 @@ impl Plan<'_> {
         let rest = (budget + count).saturating_sub(all);
         // Products of two numbers below 2³⁰.
         let left_budget = (rest as u64 * left.len() as u64 / all as u64) as usize;
-        let build_left = |left| self.piece(left, left_budget, depth + 1);
-        let build_right = |right| self.piece(right, rest - left_budget, depth + 1);
-        let (left, right) = if all > SEQUENTIAL {
-            rayon::join(|| build_left(left), || build_right(right))
-        } else {
-            (build_left(left), build_right(right))
-        };
-        Piece::parent(bounds, left, right)
+        let parts = [(left, left_budget), (right, rest - left_budget)];
+        Piece::of_parts(bounds, parts, all > SEQUENTIAL, |(part, budget)| {
+            self.piece(part, budget, depth + 1)
+        })
     }
 
     /// The first kind and the others; `None` if all are of one kind.
@@ -131,46 +120,28 @@ impl Plan<'_> {
         if overlap > self.least_overlap
             && budget > 0
             && let Some(spatial) = best_plane(self.primitives, &references, bounds, &self.cost)
-            && spatial.cost < object.as_ref().map_or(f32::INFINITY, |split| split.cost)
+            && f64::from(spatial.cost) < object.as_ref().map_or(f64::INFINITY, |split| split.cost)
             && let Some(sides) = self.spatial_halves(&references, &spatial, budget)
         {
             return sides;
         }
-        let Some(split) = object else {
-            return halves(references);
-        };
-        let mut sides = [Vec::new(), Vec::new()];
-        for (reference, is_left) in references.into_iter().zip(split.is_left) {
-            sides[usize::from(!is_left)].push(reference);
+        match object {
+            Some(split) => split.sides(references),
+            None => halves(references),
         }
-        sides
     }
 
-    fn object_split(&self, references: &[Reference]) -> Option<ObjectSplit> {
-        let boxes: Vec<_> = references
-            .iter()
-            .map(|reference| reference.bounds)
-            .collect();
-        let mut best: Option<ObjectSplit> = None;
-        for axis in 0..3 {
-            let Some(candidates) = Candidates::new(&boxes, axis) else {
-                continue;
-            };
-            for split in candidates.splits() {
-                let (left, right) = (&candidates.left[split], &candidates.right[split]);
-                let cost = self.cost.of_box(&left.bounds, left.count)
-                    + self.cost.of_box(&right.bounds, right.count);
-                if cost < best.as_ref().map_or(f32::INFINITY, |best| best.cost) {
-                    let is_left = |bin: &u8| usize::from(*bin) < split;
-                    best = Some(ObjectSplit {
-                        cost,
-                        is_left: candidates.bins.iter().map(is_left).collect(),
-                        bounds: [left.bounds, right.bounds],
-                    });
-                }
-            }
-        }
-        best
+    fn object_split(&self, references: &[Reference]) -> Option<Split> {
+        let boxes = references.iter().map(|reference| reference.bounds);
+        let boxes: Vec<_> = boxes.collect();
+        let side = |part: &Part| self.cost.of_box(&part.bounds, part.count);
+        let split = cheapest(&boxes, |candidates| {
+            let Candidates { left, right, .. } = candidates;
+            let cost = |split: usize| side(&left[split]) + side(&right[split]);
+            let splits = candidates.splits();
+            splits.map(|split| (f64::from(cost(split)), ())).collect()
+        });
+        split.map(|(split, ())| split)
     }
 
     /// Divides the references at a plane. One that the plane cuts goes to both sides, or to that one of them where it costs

@@ -39,6 +39,32 @@ pub(crate) struct SpatialSplit {
     pub cost: f32,
 }
 
+/// What is in each slab between two planes of an axis, and how many references begin and end there.
+fn slabs(
+    primitives: &Primitives,
+    references: &[Reference],
+    axis: usize,
+    (plane, bin): (impl Fn(usize) -> f32, impl Fn(f32) -> usize),
+) -> ([Aabb; BINS], [usize; BINS], [usize; BINS]) {
+    let mut slabs = [Aabb::EMPTY; BINS];
+    let (mut begins, mut ends) = ([0; BINS], [0; BINS]);
+    for reference in references {
+        let first = bin(reference.bounds.min[axis]);
+        let last = bin(reference.bounds.max[axis]);
+        begins[first] += 1;
+        ends[last] += 1;
+        if first == last {
+            slabs[first] = slabs[first].union(&reference.bounds);
+            continue;
+        }
+        for slab in first..=last {
+            let part = reference.between(primitives, axis, [plane(slab), plane(slab + 1)]);
+            slabs[slab] = slabs[slab].union(&part);
+        }
+    }
+    (slabs, begins, ends)
+}
+
 /// The plane that costs least, the first of equals; `None` if none leaves fewer references on either side than there
 /// are, or areas are too large to be compared.
 pub(crate) fn best_plane(
@@ -67,22 +93,7 @@ pub(crate) fn best_plane(
             }
             bin
         };
-        let mut slabs = [Aabb::EMPTY; BINS];
-        let (mut begins, mut ends) = ([0; BINS], [0; BINS]);
-        for reference in references {
-            let first = bin(reference.bounds.min[axis]);
-            let last = bin(reference.bounds.max[axis]);
-            begins[first] += 1;
-            ends[last] += 1;
-            if first == last {
-                slabs[first] = slabs[first].union(&reference.bounds);
-                continue;
-            }
-            for slab in first..=last {
-                let part = reference.between(primitives, axis, [plane(slab), plane(slab + 1)]);
-                slabs[slab] = slabs[slab].union(&part);
-            }
-        }
+        let (slabs, begins, ends) = slabs(primitives, references, axis, (&plane, bin));
         let mut rights = [(Aabb::EMPTY, 0); BINS + 1];
         for slab in (0..BINS).rev() {
             let (bounds, count) = rights[slab + 1];
