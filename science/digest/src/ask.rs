@@ -51,6 +51,30 @@ fn visited(hits: &mut Vec<Hit>, hit: Hit) -> Visit {
     }
 }
 
+/// A query or a batch under the condition of this name; `all` is every one but `mask`, which is one mask for all rays.
+macro_rules! under {
+    ($condition:expr, $query:expr; $masks:ident($own:expr), except($excluded:expr), filter($filter:expr)) => {{
+        let has = |what| [what, "all"].contains(&$condition);
+        let mut query = $query;
+        if $condition == "mask" {
+            query = query.mask(1);
+        }
+        if has("masks") {
+            query = query.$masks($own);
+        }
+        if has("except") {
+            query = query.except($excluded);
+        }
+        if has("filter") {
+            query = query.filter($filter);
+        }
+        if has("closed") {
+            query = query.closed();
+        }
+        query
+    }};
+}
+
 impl<'a> Questions<'a> {
     /// Leaves out the primitive that each ray hits first, for two of three rays.
     pub fn new(bvh: &Bvh, rays: &'a [Ray], points: &'a [[f32; 3]]) -> Self {
@@ -151,23 +175,7 @@ impl<'a> Questions<'a> {
     /// A query about one ray.
     fn one(&self, bvh: &Bvh, condition: &'static str, ray: usize, ask: impl FnOnce(RayQuery<'_>)) {
         let filter = |hit: &Hit| counts(ray, hit);
-        let has = |what| [what, "all"].contains(&condition);
-        let mut query = bvh.query(&self.rays[ray]);
-        if condition == "mask" {
-            query = query.mask(1);
-        }
-        if has("masks") {
-            query = query.mask(self.masks[ray]);
-        }
-        if has("except") {
-            query = query.except(self.excluded[ray]);
-        }
-        if has("filter") {
-            query = query.filter(&filter);
-        }
-        if has("closed") {
-            query = query.closed();
-        }
+        let query = under!(condition, bvh.query(&self.rays[ray]); mask(self.masks[ray]), except(self.excluded[ray]), filter(&filter));
         ask(query);
     }
 
@@ -221,24 +229,8 @@ impl<'a> Questions<'a> {
         answers.push(bits.answer("occluded", (condition, "bits")));
     }
 
-    fn many<'b>(&'b self, mut batch: Batch<'b>, condition: &'static str) -> Batch<'b> {
-        let has = |what| [what, "all"].contains(&condition);
-        if condition == "mask" {
-            batch = batch.mask(1);
-        }
-        if has("masks") {
-            batch = batch.masks(&self.masks);
-        }
-        if has("except") {
-            batch = batch.except(&self.excluded);
-        }
-        if has("filter") {
-            batch = batch.filter(&counts);
-        }
-        if has("closed") {
-            batch = batch.closed();
-        }
-        batch
+    fn many<'b>(&'b self, batch: Batch<'b>, condition: &'static str) -> Batch<'b> {
+        under!(condition, batch; masks(&self.masks), except(&self.excluded), filter(&counts))
     }
 
     /// Rays without conditions: one by one, few at a time, and the queries about a hit.
@@ -348,7 +340,7 @@ impl<'a> Questions<'a> {
 
 /// Everything about rays at times.
 pub fn at_times(bvh: &Bvh, moving: &Moving) -> Vec<Answer> {
-    let Moving { rays, times, .. } = moving;
+    let (rays, times) = (&moving.scene.rays, &moving.times);
     let (mut found, mut hits) = (vec![false; rays.len()], vec![None; rays.len()]);
     let mut answers = Vec::new();
     for (way, len) in [("batch", rays.len()), ("few", 13), ("single", 1)] {

@@ -102,33 +102,19 @@ fn still(args: &Args, name: &str, scene: &Scene) -> Vec<String> {
         let tree = format!("{recipe} w{width}");
         rows.push(format!("saved {name} {tree} {}", trees::saved(bvh)));
         let counted = |bvh: &Bvh| trees::counted(bvh, &scene.rays);
-        rows.extend(at_levels(
-            args,
-            turn,
-            bvh,
-            [&format!("counts {name} {tree}"), " occluded"],
-            counted,
-        ));
+        let of_counts = [&*format!("counts {name} {tree}"), " occluded"];
+        rows.extend(at_levels(args, turn, bvh, of_counts, counted));
         if *recipe != "default" {
-            answers.add(
-                &tree,
-                questions.briefly(bvh, if args.short { 1 } else { 12 }),
-            );
+            let times = if args.short { 1 } else { 12 };
+            answers.add(&tree, questions.briefly(bvh, times));
             continue;
         }
         let first = |bvh: &Bvh| questions.first_occluders(bvh);
-        rows.extend(at_levels(
-            args,
-            turn,
-            bvh,
-            [&format!("first {name} w{width}"), ""],
-            first,
-        ));
+        let of_first = [&*format!("first {name} w{width}"), ""];
+        rows.extend(at_levels(args, turn, bvh, of_first, first));
         for (what, bytes) in trees::changed(scene, *width, bvh.clone()) {
-            rows.push(format!(
-                "saved {name} {what} w{width} {}",
-                trees::hashed(&bytes)
-            ));
+            let saved = trees::hashed(&bytes);
+            rows.push(format!("saved {name} {what} w{width} {saved}"));
         }
         // In short, conditions one by one in trees of one width only.
         let conditions = match args.short && *width != Width::W8 {
@@ -139,10 +125,8 @@ fn still(args: &Args, name: &str, scene: &Scene) -> Vec<String> {
             for (kind, mut bvh) in trees::masked(scene, *width, bvh.clone()) {
                 for isa in args.levels(turn) {
                     engine(isa, bvh.width()).run(&mut bvh).expect("its width");
-                    answers.add(
-                        &format!("{kind} w{width} {}", isa.level()),
-                        questions.all(&bvh, conditions),
-                    );
+                    let tree = format!("{kind} w{width} {}", isa.level());
+                    answers.add(&tree, questions.all(&bvh, conditions));
                 }
             }
         }

@@ -23,10 +23,7 @@ pub struct Scene {
 
 /// What moves while rays are traced, each ray at its own time.
 pub struct Moving {
-    pub world: Vec<Geometry<'static>>,
-    pub objects: Vec<Vec<Geometry<'static>>>,
-    pub instances: Vec<Instance>,
-    pub rays: Vec<Ray>,
+    pub scene: Scene,
     pub times: Vec<f32>,
 }
 
@@ -496,11 +493,12 @@ pub fn moving() -> Moving {
         _ => rng.unit(),
     };
     let times = rays.iter().map(time).collect();
-    Moving {
+    let scene = Scene {
         world,
         objects,
         instances,
         rays,
-        times,
-    }
+        points: Vec::new(),
+    };
+    Moving { scene, times }
 }

@@ -140,16 +140,16 @@ pub fn changed(scene: &Scene, width: Width, mut bvh: Bvh) -> Vec<(&'static str, 
 
 /// Trees of a moving scene: wholes, and one for each span of time.
 pub fn moving(moving: &Moving, width: Width) -> ([(&'static str, Bvh); 2], Vec<Bvh>) {
-    let primitives =
-        Primitives::with_instances(&moving.world, &moving.objects, &moving.instances).expect(SOUND);
+    let rays = &moving.scene.rays;
+    let primitives = primitives(&moving.scene);
     let recipe = learned(Recipe::default(), width);
     let build = Build::new(&primitives).recipe(&recipe);
     let plain = build.bvh().expect(SOUND);
-    let whole = build.rays(&moving.rays).times(&moving.times);
+    let whole = build.rays(rays).times(&moving.times);
     let learned = whole.bvh().expect(SOUND);
     let span = |span| {
         let primitives = primitives.middle(span);
-        Bvh::learn(&primitives, &training(&moving.rays), &recipe).expect(SOUND)
+        Bvh::learn(&primitives, &training(rays), &recipe).expect(SOUND)
     };
     (
         [("plain", plain), ("learned", learned)],
