@@ -20,7 +20,7 @@ use antumbra_render::{
 
 use crate::Error;
 use comparison::{Candidate, Comparison, Found};
-use trees::{Maker, Ready, Training};
+use trees::{First, Maker, Ready, Training};
 
 /// A picture that many trees were compared on.
 #[derive(Clone, Debug)]
@@ -104,24 +104,7 @@ pub fn compare(
     let trees = maker.trees(&session, recipes, &training, (options.seed, monitor))?;
     let firsts = maker.firsts;
 
-    // Orders are compared with the tree that they began with: with the one that keeps it as it is, or else beside them.
-    let candidate = |bvh, timed| Candidate { bvh, timed };
-    let mut candidates: Vec<_> = trees
-        .iter()
-        .map(|tree| candidate(&tree.bvh, true))
-        .collect();
-    let mut before = vec![None; firsts.len()];
-    for (place, (tree, recipe)) in trees.iter().zip(recipes).enumerate() {
-        if recipe.order == Order::Simple {
-            before[tree.first] = Some(place);
-        }
-    }
-    for tree in trees.iter().filter(|tree| tree.learns) {
-        before[tree.first].get_or_insert_with(|| {
-            candidates.push(candidate(&firsts[tree.first].bvh, false));
-            candidates.len() - 1
-        });
-    }
+    let (candidates, before) = candidates(&trees, recipes, &firsts);
     let (window, batches) = (session.window(), session.batches());
     let comparison = Comparison::new(candidates, rounds.max(1), window, batches, options.cost_map);
     let ObservedPicture {
@@ -160,6 +143,31 @@ pub fn compare(
         occluded_rays: total.occluded_rays,
         held_out_rays: main.shadow_rays,
     })
+}
+
+/// What is compared, and the place of the tree that each first tree is counted in. Orders are compared with the tree that they
+/// began with: with the one that keeps it as it is, or else with itself, beside the others.
+fn candidates<'a>(
+    trees: &'a [Ready],
+    recipes: &[Recipe],
+    firsts: &'a [First],
+) -> (Vec<Candidate<'a>>, Vec<Option<usize>>) {
+    let candidate = |bvh, timed| Candidate { bvh, timed };
+    let all = trees.iter().map(|tree| candidate(&tree.bvh, true));
+    let mut candidates: Vec<_> = all.collect();
+    let mut before = vec![None; firsts.len()];
+    for (place, (tree, recipe)) in trees.iter().zip(recipes).enumerate() {
+        if recipe.order == Order::Simple {
+            before[tree.first] = Some(place);
+        }
+    }
+    for tree in trees.iter().filter(|tree| tree.learns) {
+        before[tree.first].get_or_insert_with(|| {
+            candidates.push(candidate(&firsts[tree.first].bvh, false));
+            candidates.len() - 1
+        });
+    }
+    (candidates, before)
 }
 
 /// Seconds of timed closest hits, tree by tree. They do not depend on the order of children, so trees that differ only in

@@ -116,10 +116,7 @@ impl Training {
         let rays = rays.unwrap_or_else(PoisonError::into_inner);
         let lesson = session.lesson(&rays);
         let busy = pool_seconds() - before;
-        let mut occluded = vec![false; rays.len()];
-        let own = timed(&rays, &mut occluded, |rays, occluded| {
-            bvh.batch(rays).on_this_thread().occluded_into(occluded);
-        });
+        let own = seconds_of(bvh, &rays);
         Ok(Self {
             lesson,
             rays,
@@ -130,12 +127,13 @@ impl Training {
 }
 
 /// Answers rays in tasks. Returns the seconds of all threads.
-fn timed(rays: &[Ray], occluded: &mut [bool], answer: impl Fn(&[Ray], &mut [bool]) + Sync) -> f64 {
+fn seconds_of(bvh: &Bvh, rays: &[Ray]) -> f64 {
+    let mut occluded = vec![false; rays.len()];
     rays.par_chunks(CHUNK)
         .zip(occluded.par_chunks_mut(CHUNK))
         .map(|(rays, occluded)| {
             let start = thread_seconds();
-            answer(rays, occluded);
+            bvh.batch(rays).on_this_thread().occluded_into(occluded);
             thread_seconds() - start
         })
         .sum()
@@ -151,13 +149,7 @@ impl First {
         if let Some(traced) = self.traced {
             return traced;
         }
-        let mut occluded = vec![false; rays.len()];
-        let seconds = timed(rays, &mut occluded, |rays, occluded| {
-            self.bvh
-                .batch(rays)
-                .on_this_thread()
-                .occluded_into(occluded);
-        });
+        let seconds = seconds_of(&self.bvh, rays);
         let (_, costs) = counted(&self.bvh, rays);
         *self.traced.insert((seconds, mean(sum(&costs), rays.len())))
     }

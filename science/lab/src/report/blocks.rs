@@ -128,6 +128,13 @@ impl Measured {
         }
     }
 
+    /// A median of rounds. A single one may be anything: nothing beats it, and it beats nothing.
+    pub fn of_rounds(value: Option<f64>, range: Option<[f64; 2]>, rounds: u32) -> Option<Self> {
+        let whole = [f64::NEG_INFINITY, f64::INFINITY];
+        let range = range.filter(|_| rounds > 1).unwrap_or(whole);
+        value.map(|value| Self { value, range })
+    }
+
     /// Whether all repetitions of this are better than all of the other.
     pub fn beats(&self, other: &Self, most: bool) -> bool {
         match most {

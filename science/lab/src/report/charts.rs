@@ -78,13 +78,25 @@ fn hue(series: usize) -> RGBColor {
     HUES[series % HUES.len()]
 }
 
-/// Draws with a height, and makes the result fit the page.
-fn svg(height: u32, draw: impl FnOnce(&Area) -> Drawn) -> Result<String, Error> {
+/// Draws below a legend, with a height of its own, and makes the result fit the page.
+fn svg(height: u32, names: &[String], draw: impl FnOnce(&Area) -> Drawn) -> Result<String, Error> {
+    let (places, legend) = legend_places(names);
+    let height = height + legend;
     let mut text = String::new();
     {
         let root = SVGBackend::with_string(&mut text, (WIDTH, height)).into_drawing_area();
-        let drawn = draw(&root).and_then(|()| Ok(root.present()?));
-        drawn.map_err(|error| Error::report(format!("cannot draw a plot: {error}")))?;
+        let whole = || -> Drawn {
+            let (above, below) = root.split_vertically(legend);
+            let style = FONT.into_font().color(&BLACK);
+            for (series, (name, (x, y))) in names.iter().zip(places).enumerate() {
+                let square = [(x, y + 3), (x + 11, y + 14)];
+                above.draw(&Rectangle::new(square, hue(series).filled()))?;
+                above.draw_text(name, &style, (x + 17, y))?;
+            }
+            draw(&below)?;
+            Ok(root.present()?)
+        };
+        whole().map_err(|error| Error::report(format!("cannot draw a plot: {error}")))?;
     }
     // The size is the page's business; black is the colour of its text.
     let size = format!("width=\"{WIDTH}\" height=\"{height}\" ");
@@ -114,16 +126,11 @@ fn range(values: impl Iterator<Item = f64>, from_zero: bool) -> std::ops::Range<
     low..high + room
 }
 
-/// Coloured squares with names, in as many rows as they need; returns their height.
-fn legend_height(names: &[String]) -> u32 {
-    if names.len() < 2 {
-        return 0;
-    }
-    let (_, rows) = legend_places(names);
-    20 * rows + 6
-}
-
+/// Where the names of a legend are, and its height; none of less than two names.
 fn legend_places(names: &[String]) -> (Vec<(i32, i32)>, u32) {
+    if names.len() < 2 {
+        return (Vec::new(), 0);
+    }
     let (mut x, mut y) = (8, 0);
     let mut places = Vec::new();
     for name in names {
@@ -135,20 +142,7 @@ fn legend_places(names: &[String]) -> (Vec<(i32, i32)>, u32) {
         places.push((x, y));
         x += width;
     }
-    (places, y as u32 / 20 + 1)
-}
-
-fn draw_legend(area: &Area, names: &[String]) -> Drawn {
-    if names.len() < 2 {
-        return Ok(());
-    }
-    let style = FONT.into_font().color(&BLACK);
-    for (series, (name, (x, y))) in names.iter().zip(legend_places(names).0).enumerate() {
-        let square = [(x, y + 3), (x + 11, y + 14)];
-        area.draw(&Rectangle::new(square, hue(series).filled()))?;
-        area.draw_text(name, &style, (x + 17, y))?;
-    }
-    Ok(())
+    (places, y as u32 + 26)
 }
 
 fn room_for(names: impl Iterator<Item = usize>) -> u32 {
@@ -174,17 +168,14 @@ impl Dots {
 
     /// Draws them.
     pub fn draw(&self) -> Result<String, Error> {
-        let legend = legend_height(&self.series);
-        let height = LINE * self.lines.len() as u32 + AROUND + legend;
-        svg(height, |root| {
-            let (above, below) = root.split_vertically(legend);
-            draw_legend(&above, &self.series)?;
+        let height = LINE * self.lines.len() as u32 + AROUND;
+        svg(height, &self.series, |area| {
             let values = self.dots.iter().map(|dot| dot.value);
             let marked = self.mark.iter().map(|(value, _)| *value);
             let x = range(values.chain(marked), self.from_zero);
             let lines = self.lines.len() as f64;
             let names: Vec<_> = self.lines.iter().map(String::as_str).collect();
-            let mut chart = named_lines(&below, &names, x.clone(), &self.axis)?;
+            let mut chart = named_lines(area, &names, x.clone(), &self.axis)?;
             for line in 0..self.lines.len() {
                 let y = line as f64 + 0.5;
                 chart.draw_series([PathElement::new([(x.start, y), (x.end, y)], faint())])?;
@@ -250,7 +241,6 @@ impl Points {
     /// Draws them.
     pub fn draw(&self) -> Result<String, Error> {
         let names: Vec<String> = self.series.iter().map(|(name, _)| name.clone()).collect();
-        let legend = legend_height(&names);
         let all = || {
             self.series
                 .iter()
@@ -258,10 +248,8 @@ impl Points {
         };
         let x = range(all().map(|(x, _)| x), false);
         let y = range(all().map(|(_, y)| y), false);
-        svg(Self::HEIGHT + legend, |root| {
-            let (above, below) = root.split_vertically(legend);
-            draw_legend(&above, &names)?;
-            let mut builder = ChartBuilder::on(&below);
+        svg(Self::HEIGHT, &names, |area| {
+            let mut builder = ChartBuilder::on(area);
             builder
                 .margin_right(18)
                 .margin_top(8)
@@ -283,11 +271,7 @@ impl Points {
 
     fn fill<X>(
         &self,
-        mut chart: ChartContext<
-            '_,
-            SVGBackend<'_>,
-            Cartesian2d<X, plotters::coord::types::RangedCoordf64>,
-        >,
+        mut chart: ChartContext<'_, SVGBackend<'_>, Cartesian2d<X, RangedCoordf64>>,
     ) -> Drawn
     where
         X: Ranged<ValueType = f64> + ValueFormatter<f64>,
@@ -330,15 +314,12 @@ impl Points {
 impl Stacks {
     /// Draws them.
     pub fn draw(&self) -> Result<String, Error> {
-        let legend = legend_height(&self.parts);
-        let height = LINE * self.lines.len() as u32 + AROUND + legend;
+        let height = LINE * self.lines.len() as u32 + AROUND;
         let longest = self.lines.iter().map(|(_, parts)| parts.iter().sum());
         let x = 0.0..longest.fold(0.0_f64, f64::max).max(1e-9) * 1.02;
-        svg(height, |root| {
-            let (above, below) = root.split_vertically(legend);
-            draw_legend(&above, &self.parts)?;
+        svg(height, &self.parts, |area| {
             let names: Vec<_> = self.lines.iter().map(|(name, _)| name.as_str()).collect();
-            let mut chart = named_lines(&below, &names, x.clone(), &self.axis)?;
+            let mut chart = named_lines(area, &names, x.clone(), &self.axis)?;
             for (line, (_, parts)) in self.lines.iter().enumerate() {
                 let mut start = 0.0;
                 for (part, value) in parts.iter().enumerate() {

@@ -61,27 +61,28 @@ fn runs<'a, K: PartialEq>(rows: &[&'a Row], key: impl Fn(&Row) -> K) -> Vec<Vec<
         .collect()
 }
 
+/// Rows of which this is true.
+fn only<'a>(rows: &[&'a Row], is_wanted: impl Fn(&Row) -> bool) -> Vec<&'a Row> {
+    let wanted = rows.iter().filter(|row| is_wanted(row));
+    wanted.copied().collect()
+}
+
 /// The tables of all scenes: pictures by width, replays by kind of rays.
 fn tables(plan: &Plan, rows: &[&Row]) -> Vec<Table> {
     let mut tables = Vec::new();
     let (tree, collapse) = plan.base();
     for run in runs(rows, |row| (row.scene.clone(), row.by, row.width)) {
         if run[0].by == By::Render {
-            let first = |row: &&&Row| row.is_on(tree.name(), collapse.name());
-            let orders: Vec<&Row> = run.iter().filter(first).copied().collect();
-            let others: Vec<&Row> = run.iter().filter(|row| !first(row)).copied().collect();
+            let is_first = |row: &Row| row.is_on(tree.name(), collapse.name());
+            let orders = only(&run, is_first);
             tables.extend(of_orders(&orders));
             tables.extend(of_the_paper(&orders));
-            tables.extend(of_trees(&others));
+            tables.extend(of_trees(&only(&run, |row| !is_first(row))));
             tables.extend(of_measured(&run));
         }
     }
     for kind in Kind::ALL {
-        let replayed: Vec<&Row> = rows
-            .iter()
-            .filter(|r| r.by == By::Replay && r.part == Part::Techniques && r.rays == kind)
-            .copied()
-            .collect();
+        let replayed = only(rows, |row| row.is_replay(kind, Part::Techniques));
         for run in runs(&replayed, |row| row.scene.clone()) {
             tables.push(of_best(plan, run));
         }
@@ -269,10 +270,7 @@ fn of_trees(rows: &[&Row]) -> Option<Table> {
 
 /// Whole pictures that were rendered apart, if any were.
 fn of_measured(rows: &[&Row]) -> Option<Table> {
-    let measured: Vec<&Row> = (rows.iter())
-        .filter(|row| row.measured_seconds.is_some())
-        .copied()
-        .collect();
+    let measured = only(rows, |row| row.measured_seconds.is_some());
     let first = measured.first()?;
     let caption = format!(
         "{}: width {}, whole pictures rendered apart, median of {}",

@@ -8,6 +8,7 @@ use minijinja::value::Serde;
 use serde::Serialize;
 
 use super::blocks::Block;
+use super::only;
 use super::overview::overview;
 use super::paper::{self, Figures};
 use super::renderings::{Wipe, paper_table, wipe};
@@ -181,18 +182,7 @@ impl Scene {
                 .extend(paper_table(plan, rows, width.lanes(), paper));
         }
         for kind in Kind::ALL {
-            let replayed: Vec<&Row> = rows
-                .iter()
-                .filter(|row| row.by == By::Replay && row.rays == kind)
-                .copied()
-                .collect();
-            let part = |part: Part| -> Vec<&Row> {
-                replayed
-                    .iter()
-                    .filter(|row| row.part == part)
-                    .copied()
-                    .collect()
-            };
+            let part = |part| only(rows, |row| row.is_replay(kind, part));
             let techniques = part(Part::Techniques);
             if techniques.is_empty() {
                 continue;

@@ -6,9 +6,9 @@ use antumbra::recipe::Order;
 use serde::Serialize;
 
 use super::blocks::{Block, Cell, Line, Measured, marked_line, plain_line};
-use super::learned;
 use super::paper::{self, Figures};
 use super::pictures::{Comparison, Maps};
+use super::{learned, only};
 use crate::Error;
 use crate::study::{By, Combination, Files, Plan, Row, Subject};
 use crate::table::number;
@@ -33,9 +33,7 @@ pub fn wipe(
     let row_of = |c: &Combination| {
         rows.iter().find(|row| {
             row.by == By::Render
-                && row.width == c.width.lanes()
-                && row.is_on(c.tree.name(), c.collapse.name())
-                && row.order == c.order.name()
+                && row.is_of(c)
                 && row.prim_cost == c.prim_cost.unwrap_or(plan.costs.prim)
         })
     };
@@ -96,12 +94,10 @@ pub fn order_name(plan: &Plan, row: &Row) -> String {
 /// The layout of the paper's Tables 2 and 3: techniques beside each other, figures below each other.
 pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) -> Option<Block> {
     let (tree, collapse) = plan.base();
-    let own: Vec<&Row> = rows
-        .iter()
-        .filter(|row| row.by == By::Render && row.width == width)
-        .filter(|row| row.is_on(tree.name(), collapse.name()))
-        .copied()
-        .collect();
+    let is_own = |row: &Row| row.by == By::Render && row.width == width;
+    let own = only(rows, |row| {
+        is_own(row) && row.is_on(tree.name(), collapse.name())
+    });
     let first = own.first()?;
     let mut lines = own_figures(&own, first);
     let theirs = paper::counterpart(&first.scene);
@@ -139,9 +135,27 @@ pub fn paper_table(plan: &Plan, rows: &[&Row], width: usize, paper: &[Figures]) 
     )
 }
 
+type Figure = fn(&Row) -> Option<f64>;
+
+/// Counted figures, and whether the best is marked. The last three are of scenes with instances only.
+const COUNTS: [(&str, bool, Figure); 9] = [
+    ("N_b before", false, |row| row.node_tests_before),
+    ("N_t before", false, |row| row.prim_tests_before),
+    ("N_b after", true, |row| row.node_tests_after),
+    ("N_t after", true, |row| row.prim_tests_after),
+    ("N_b unsorted", false, |row| row.node_tests_unsorted),
+    ("N_t unsorted", false, |row| row.prim_tests_unsorted),
+    ("top level: N_b before", false, |row| {
+        row.top_node_tests_before
+    }),
+    ("top level: N_b after", true, |row| row.top_node_tests_after),
+    ("top level: N_b unsorted", false, |row| {
+        row.top_node_tests_unsorted
+    }),
+];
+
 /// Lines of our own figures.
 fn own_figures(own: &[&Row], first: &Row) -> Vec<Line> {
-    type Figure = fn(&Row) -> Option<f64>;
     let plain_of = |name: &str, decimals, value: &dyn Fn(&Row) -> Option<f64>| {
         let values: Vec<Option<f64>> = own.iter().map(|row| value(row)).collect();
         plain_line(name.to_owned(), &values, decimals)
@@ -150,31 +164,17 @@ fn own_figures(own: &[&Row], first: &Row) -> Vec<Line> {
         let values: Vec<Option<Measured>> = own.iter().map(|row| value(row)).collect();
         marked_line(name.to_owned(), &values, 2, false)
     };
-    let counts: [(&str, bool, Figure); 9] = [
-        ("N_b before", false, |row| row.node_tests_before),
-        ("N_t before", false, |row| row.prim_tests_before),
-        ("N_b after", true, |row| row.node_tests_after),
-        ("N_t after", true, |row| row.prim_tests_after),
-        ("N_b unsorted", false, |row| row.node_tests_unsorted),
-        ("N_t unsorted", false, |row| row.prim_tests_unsorted),
-        ("top level: N_b before", false, |row| {
-            row.top_node_tests_before
-        }),
-        ("top level: N_b after", true, |row| row.top_node_tests_after),
-        ("top level: N_b unsorted", false, |row| {
-            row.top_node_tests_unsorted
-        }),
-    ];
-    let levels = if first.top_node_tests_after.is_some() {
-        9
-    } else {
-        6
-    };
+    let levels = COUNTS.len()
+        - if first.top_node_tests_after.is_some() {
+            0
+        } else {
+            3
+        };
     let count = |&(name, is_marked, figure): &(&str, bool, Figure)| match is_marked {
         true => marked(name, &|row| figure(row).map(Measured::exact)),
         false => plain_of(name, 2, &figure),
     };
-    let mut lines: Vec<Line> = counts[..levels].iter().map(count).collect();
+    let mut lines: Vec<Line> = COUNTS[..levels].iter().map(count).collect();
     lines.extend([
         plain_of("logging, s", 2, &|row| learned(row, row.log_seconds)),
         plain_of("sorting, ms", 1, &|row| {
@@ -182,14 +182,9 @@ fn own_figures(own: &[&Row], first: &Row) -> Vec<Line> {
         }),
     ]);
     // A time without a spread marks nothing.
-    let timed = |value: Option<f64>, range: Option<[f64; 2]>, rounds: u32| {
-        let whole = [f64::NEG_INFINITY, f64::INFINITY];
-        let range = range.filter(|_| rounds > 1).unwrap_or(whole);
-        value.map(|value| Measured { value, range })
-    };
     lines.push(marked("whole picture, composed, s", &|row| {
         let (value, range) = (row.render_seconds, row.render_seconds_range);
-        timed(value, range, row.timed_renderings)
+        Measured::of_rounds(value, range, row.timed_renderings)
     }));
     if first.timed_renderings > 1 {
         let cells = own.iter().map(|row| match row.spread() {
@@ -203,7 +198,7 @@ fn own_figures(own: &[&Row], first: &Row) -> Vec<Line> {
     if own.iter().any(|row| row.measured_seconds.is_some()) {
         lines.push(marked("whole picture, measured, s", &|row| {
             let (value, range) = (row.measured_seconds, row.measured_seconds_range);
-            timed(value, range, row.measured_renderings)
+            Measured::of_rounds(value, range, row.measured_renderings)
         }));
         let spread = |row: &Row| row.measured_seconds_range.map(|[least, most]| most / least);
         lines.push(plain_of("slowest / fastest measured", 2, &spread));

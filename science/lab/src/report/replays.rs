@@ -4,7 +4,7 @@ use antumbra::recipe::{Builder, Collapse, Order};
 
 use super::blocks::{Block, Cell, Line, words};
 use super::charts::{Dot, Dots, Points};
-use super::{sort_by_speed, summary};
+use super::{only, sort_by_speed, summary};
 use crate::Error;
 use crate::study::{Kind, Plan, Row, Trained};
 use crate::table::count;
@@ -128,34 +128,32 @@ pub fn prediction(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Option<Block
     )))
 }
 
+/// Node tests of the occluded rays in an order and by the oracle, and the per cent of the way from order simple to the
+/// oracle that the order goes; `None` unless all are known.
+fn part_of_gap(rows: &[&Row], row: &Row) -> Option<[f64; 3]> {
+    let mut of_width = rows.iter().filter(|other| other.width == row.width);
+    let simple = of_width.find(|other| other.order == Order::Simple.name())?;
+    let (from, oracle) = (simple.node_tests_occluded?, row.oracle_occluded?);
+    let tests = row.node_tests_occluded?;
+    Some([tests, oracle, 100.0 * (from - tests) / (from - oracle)])
+}
+
 /// How much of the way to the oracle each order goes.
 pub fn gap(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Option<Block>, Error> {
     let (tree, base) = plan.base();
     // Where the collapse has learned an order, `simple` is no beginning.
     let unlearned = plan.collapses.contains(&Collapse::Area);
     let collapse = if unlearned { Collapse::Area } else { base };
-    let own = || {
-        rows.iter()
-            .filter(|row| row.is_on(tree.name(), collapse.name()))
-    };
-    let mut dots = Vec::new();
+    let own = only(rows, |row| row.is_on(tree.name(), collapse.name()));
     let orders: Vec<String> = plan.orders.iter().map(ToString::to_string).collect();
-    let mut lines = Vec::new();
-    for row in own() {
-        let simple = own().find(|r| r.width == row.width && r.order == Order::Simple.name());
-        let ends = simple.and_then(|simple| simple.node_tests_occluded.zip(row.oracle_occluded));
-        let (Some((from, to)), Some(tests)) = (ends, row.node_tests_occluded) else {
+    let (mut dots, mut lines) = (Vec::new(), Vec::new());
+    for row in &own {
+        let line = orders.iter().position(|order| *order == row.order);
+        let (Some(line), Some([tests, oracle, closed])) = (line, part_of_gap(&own, row)) else {
             continue;
         };
-        let closed = 100.0 * (from - tests) / (from - to);
-        let Some(line) = orders.iter().position(|order| *order == row.order) else {
-            continue;
-        };
-        let series = plan
-            .widths
-            .iter()
-            .position(|w| w.lanes() == row.width)
-            .unwrap_or(0);
+        let place = plan.widths.iter().position(|w| w.lanes() == row.width);
+        let series = place.unwrap_or(0);
         dots.push(Dot {
             line,
             series,
@@ -165,7 +163,7 @@ pub fn gap(plan: &Plan, rows: &[&Row], kind: Kind) -> Result<Option<Block>, Erro
         let values = [
             Some(tests),
             row.node_tests_unoccluded,
-            Some(to),
+            Some(oracle),
             Some(closed),
         ];
         let cells = values.into_iter().zip([2, 2, 2, 0]);
@@ -270,13 +268,10 @@ pub fn transfer(
             Kind::Ao => "shadow rays",
         },
     };
-    let own = |row: &&&Row| row.tree == tree.name() && row.order == order.name();
-    let mut shown: Vec<&Row> = techniques
-        .iter()
-        .chain(others)
-        .filter(own)
-        .copied()
-        .collect();
+    let all = [techniques, others].concat();
+    let mut shown = only(&all, |row| {
+        row.tree == tree.name() && row.order == order.name()
+    });
     shown.sort_by_key(|row| row.learned_from as u8);
     let mut lines: Vec<String> = Vec::new();
     let series: Vec<String> = plan.collapses.iter().map(ToString::to_string).collect();

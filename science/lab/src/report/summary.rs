@@ -57,11 +57,16 @@ impl Summary {
         }
     }
 
-    fn row(&self, scene: usize, kind: Kind, combination: &Combination) -> Option<&Row> {
-        let mut rows = self.rows.iter();
-        let found = rows
-            .find(|(place, row)| *place == scene && row.rays == kind && is_of(row, combination));
-        found.map(|(_, row)| row)
+    /// Rows of a combination in all scenes that have such rays; `None` unless all were measured.
+    fn measured(&self, kind: Kind, combination: &Combination) -> Option<Vec<&Row>> {
+        let of_scene = |scene| {
+            let rows = (self.rows.iter()).filter(move |(place, _)| *place == scene);
+            rows.map(|(_, row)| row).filter(move |row| row.rays == kind)
+        };
+        let scenes = (0..self.scenes).filter(|scene| of_scene(*scene).next().is_some());
+        scenes
+            .map(|scene| of_scene(scene).find(|row| row.is_of(combination)))
+            .collect()
     }
 
     /// How many times as long whole pictures take on the paper's trees, unsorted, as by default: geometric mean, least
@@ -69,31 +74,26 @@ impl Summary {
     fn whole_pictures(&self, width: antumbra::Width) -> Option<[f64; 3]> {
         let seconds = |scene, combination: &Combination| {
             let mut rows = self.pictures.iter();
-            let found = rows.find(|(place, row)| *place == scene && is_of(row, combination));
+            let found = rows.find(|(place, row)| *place == scene && row.is_of(combination));
             found?.1.measured_seconds
         };
         let [paper, default] = ends(width);
-        let ratios: Option<Vec<f64>> = (0..self.scenes)
-            .map(|scene| Some(seconds(scene, &paper)? / seconds(scene, &default)?))
-            .collect();
-        let ratios = ratios.filter(|ratios| !ratios.is_empty())?;
-        let mean = ratios.iter().map(|x| x.ln()).sum::<f64>() / ratios.len() as f64;
-        let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
-        let most = ratios.iter().copied().fold(0.0, f64::max);
-        Some([mean.exp(), least, most])
+        let ratios =
+            (0..self.scenes).map(|scene| Some(seconds(scene, &paper)? / seconds(scene, &default)?));
+        mean_and_range(&ratios.collect::<Option<Vec<_>>>()?)
     }
 
     /// Times fewer node tests than the reference of the same width: geometric mean of all scenes. `None` unless
     /// all that have such rays were measured.
     pub fn gain(&self, kind: Kind, combination: &Combination) -> Option<f64> {
         let reference = self.reference_of(combination);
-        self.ratio(kind, &reference, combination, |row| row.node_tests_after)
+        self.mean_ratio(kind, [&reference, combination], |row| row.node_tests_after)
     }
 
     /// [`Summary::gain`] in cost, primitive tests included.
     pub fn cost_gain(&self, kind: Kind, combination: &Combination) -> Option<f64> {
         let reference = self.reference_of(combination);
-        self.ratio(kind, &reference, combination, |row| row.cost(&self.costs))
+        self.mean_ratio(kind, [&reference, combination], |row| row.cost(&self.costs))
     }
 
     /// The combination of the same width that others are compared with.
@@ -106,26 +106,28 @@ impl Summary {
         }
     }
 
-    /// A figure of one combination over the same figure of another: geometric mean of all scenes that have such rays. `None`
-    /// unless all were measured.
-    pub fn ratio(
+    /// A figure of one combination over the same figure of another: geometric mean, least and most of all scenes that have
+    /// such rays. `None` unless all were measured.
+    fn ratio(
         &self,
         kind: Kind,
-        reference: &Combination,
-        combination: &Combination,
+        [reference, combination]: [&Combination; 2],
+        figure: impl Fn(&Row) -> Option<f64>,
+    ) -> Option<[f64; 3]> {
+        let base = self.measured(kind, reference)?.into_iter();
+        let pairs = base.zip(self.measured(kind, combination)?);
+        let ratios = pairs.map(|(base, own)| Some(figure(base)? / figure(own)?));
+        mean_and_range(&ratios.collect::<Option<Vec<_>>>()?)
+    }
+
+    /// The mean of [`Summary::ratio`].
+    fn mean_ratio(
+        &self,
+        kind: Kind,
+        pair: [&Combination; 2],
         figure: impl Fn(&Row) -> Option<f64>,
     ) -> Option<f64> {
-        let mut logs = Vec::new();
-        for scene in 0..self.scenes {
-            let mut rows = self.rows.iter();
-            if rows.any(|(place, row)| *place == scene && row.rays == kind) {
-                let simple = figure(self.row(scene, kind, reference)?)?;
-                let own = figure(self.row(scene, kind, combination)?)?;
-                logs.push((simple / own).ln());
-            }
-        }
-        let mean = logs.iter().sum::<f64>() / logs.len() as f64;
-        (!logs.is_empty() && mean.is_finite()).then(|| mean.exp())
+        self.ratio(kind, pair, figure).map(|[mean, ..]| mean)
     }
 
     /// All measured combinations that learn by the plan's cost of a primitive test.
@@ -161,13 +163,7 @@ impl Summary {
     /// geometric means of the scenes. The speed of replays, or else one over the composed times of pictures. `None`
     /// unless there are several rounds in all scenes that have such rays.
     fn rate(&self, kind: Kind, combination: &Combination) -> Option<Measured> {
-        let mut logs = [0.0; 3];
-        let mut scenes = 0;
-        for scene in 0..self.scenes {
-            if !(self.rows.iter()).any(|(place, row)| *place == scene && row.rays == kind) {
-                continue;
-            }
-            let row = self.row(scene, kind, combination)?;
+        let rates = |row: &Row| {
             let composed = || {
                 let [least, most] = row.render_seconds_range?;
                 let several = row.timed_renderings > 1;
@@ -177,17 +173,14 @@ impl Summary {
                 let [least, most] = row.speed_range?;
                 Some([row.speed?, least, most])
             };
-            let rates = replayed().or_else(composed)?;
-            for (log, rate) in logs.iter_mut().zip(rates) {
-                *log += f64::ln(rate);
-            }
-            scenes += 1;
-        }
-        let [value, least, most] = logs.map(|log| (log / f64::from(scenes)).exp());
-        (scenes > 0 && value.is_finite()).then_some(Measured {
-            value,
-            range: [least, most],
-        })
+            replayed().or_else(composed)
+        };
+        let rows = self.measured(kind, combination)?;
+        let all: Vec<_> = rows.into_iter().map(rates).collect::<Option<_>>()?;
+        let [value, least, most] =
+            [0, 1, 2].map(|place| geometric_mean(all.iter().map(|rates| rates[place])));
+        let range = [least?, most?];
+        value.map(|value| Measured { value, range })
     }
 
     /// Figures for the top of the page: what a user gets, and the cheapest of all that was measured. Each has a label, a
@@ -198,9 +191,8 @@ impl Summary {
             let words = words(kind);
             for &width in &self.widths {
                 let [paper, default] = ends(width);
-                let faster = self.ratio(kind, &default, &paper, |row| row.mrays_per_s);
-                let times = self.range(kind, &default, &paper, |row| row.mrays_per_s);
-                if let (Some(faster), Some([low, high])) = (faster, times) {
+                let rates = self.ratio(kind, [&default, &paper], |row| row.mrays_per_s);
+                if let Some([faster, low, high]) = rates {
                     lines.push([
                         format!("{words}, default against the trees of the paper, unsorted"),
                         format!("{faster:.2}×"),
@@ -240,24 +232,6 @@ impl Summary {
         }
     }
 
-    /// Least and largest of what [`Summary::ratio`] is the mean of.
-    fn range(
-        &self,
-        kind: Kind,
-        reference: &Combination,
-        combination: &Combination,
-        figure: impl Fn(&Row) -> Option<f64>,
-    ) -> Option<[f64; 2]> {
-        let of = |scene| {
-            let base = figure(self.row(scene, kind, reference)?)?;
-            Some(base / figure(self.row(scene, kind, combination)?)?)
-        };
-        let found: Vec<f64> = (0..self.scenes).filter_map(of).collect();
-        let least = found.iter().copied().reduce(f64::min);
-        let most = found.iter().copied().reduce(f64::max);
-        least.zip(most).map(|(least, most)| [least, most])
-    }
-
     /// Factors of builder, collapse and order between the trees of the paper and the default, one changed at a time:
     /// name, and times fewer node tests, less cost and higher rate. Empty unless all of them were measured.
     pub fn ablation(&self, kind: Kind, width: antumbra::Width) -> Vec<(String, [Option<f64>; 3])> {
@@ -286,9 +260,9 @@ impl Summary {
             ("all".to_owned(), paper, default),
         ];
         let line = |(name, from, to): (String, Combination, Combination)| {
-            let nodes = self.ratio(kind, &from, &to, |row| row.node_tests_after);
-            let cost = self.ratio(kind, &from, &to, |row| row.cost(&self.costs));
-            let rate = self.ratio(kind, &to, &from, |row| row.mrays_per_s);
+            let nodes = self.mean_ratio(kind, [&from, &to], |row| row.node_tests_after);
+            let cost = self.mean_ratio(kind, [&from, &to], |row| row.cost(&self.costs));
+            let rate = self.mean_ratio(kind, [&to, &from], |row| row.mrays_per_s);
             (name, [nodes, cost, rate])
         };
         let lines: Vec<_> = steps.into_iter().map(line).collect();
@@ -303,11 +277,14 @@ impl Summary {
             .into_iter()
             .find(|kind| self.best(*kind).is_some())?;
         let advice = self.by_rate(kind).or_else(|| self.by_cost(kind))?;
-        let learning = self.over_free_orders();
-        Some(match learning {
-            Some(learning) => format!("{advice} {learning}"),
-            None => advice,
-        })
+        let sentences = [Some(advice), self.over_free_orders()];
+        Some(
+            sentences
+                .into_iter()
+                .flatten()
+                .collect::<Vec<_>>()
+                .join(" "),
+        )
     }
 
     /// The advice by measured rate. The default is recommended unless something beats it beyond the spread of both.
@@ -422,29 +399,9 @@ const FREE_ORDERS: [Order; 3] = [Order::Embree, Order::Sato, RTSAH];
 
 /// A combination in words.
 fn named(combination: &Combination) -> String {
-    let Combination {
-        width,
-        tree,
-        collapse,
-        order,
-        prim_cost: _,
-    } = combination;
+    let Combination { width, tree, .. } = combination;
+    let (collapse, order) = (combination.collapse, combination.order);
     format!("order {order} on builder {tree}, collapse {collapse}, {width} wide")
-}
-
-/// Whether a row is of a combination.
-fn is_of(row: &Row, combination: &Combination) -> bool {
-    let Combination {
-        width,
-        tree,
-        collapse,
-        order,
-        prim_cost,
-    } = combination;
-    row.width == width.lanes()
-        && row.is_on(tree.name(), collapse.name())
-        && row.order == order.name()
-        && prim_cost.is_none_or(|cost| row.prim_cost == cost)
 }
 
 /// The trees of the paper, unsorted, and the default.
@@ -455,22 +412,21 @@ fn ends(width: antumbra::Width) -> [Combination; 2] {
     ]
 }
 
-/// Offset and slope of the line of least squares; `None` if there is no such line.
-pub fn line(points: &[(f64, f64)]) -> Option<[f64; 2]> {
-    let n = points.len() as f64;
-    let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
-    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
-    let across: f64 = points.iter().map(|p| (p.0 - x) * (p.1 - y)).sum();
-    let along: f64 = points.iter().map(|p| (p.0 - x) * (p.0 - x)).sum();
-    let slope = across / along;
-    slope.is_finite().then_some([y - slope * x, slope])
+/// Geometric mean, least and most of ratios; `None` of none, and if they have no finite mean.
+fn mean_and_range(ratios: &[f64]) -> Option<[f64; 3]> {
+    let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
+    let most = ratios.iter().copied().fold(0.0, f64::max);
+    geometric_mean(ratios.iter().copied()).map(|mean| [mean, least, most])
 }
 
-/// Pearson's correlation coefficient; `None` of fewer than three points, or if either value is always the same.
-pub fn correlation(points: &[(f64, f64)]) -> Option<f64> {
-    if points.len() < 3 {
-        return None;
-    }
+fn geometric_mean(values: impl ExactSizeIterator<Item = f64>) -> Option<f64> {
+    let count = values.len() as f64;
+    let mean = values.map(f64::ln).sum::<f64>() / count;
+    mean.is_finite().then(|| mean.exp())
+}
+
+/// Means of both values, and sums of the products of their distances from the means: of x and y, of x, and of y.
+fn moments(points: &[(f64, f64)]) -> ([f64; 2], [f64; 3]) {
     let n = points.len() as f64;
     let mean = |of: fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / n;
     let (x, y) = (mean(|p| p.0), mean(|p| p.1));
@@ -481,8 +437,21 @@ pub fn correlation(points: &[(f64, f64)]) -> Option<f64> {
         sums[1] += dx * dx;
         sums[2] += dy * dy;
     }
-    let spread = (sums[1] * sums[2]).sqrt();
-    (spread > 0.0 && spread.is_finite()).then(|| sums[0] / spread)
+    ([x, y], sums)
+}
+
+/// Offset and slope of the line of least squares; `None` if there is no such line.
+pub fn line(points: &[(f64, f64)]) -> Option<[f64; 2]> {
+    let ([x, y], [across, along, _]) = moments(points);
+    let slope = across / along;
+    slope.is_finite().then_some([y - slope * x, slope])
+}
+
+/// Pearson's correlation coefficient; `None` of fewer than three points, or if either value is always the same.
+pub fn correlation(points: &[(f64, f64)]) -> Option<f64> {
+    let (_, [both, x, y]) = moments(points);
+    let spread = (x * y).sqrt();
+    (points.len() > 2 && spread > 0.0 && spread.is_finite()).then(|| both / spread)
 }
 
 #[cfg(test)]
@@ -515,7 +484,7 @@ mod tests {
         let mut rows = results.placed;
         for (scene, row) in &mut rows {
             for (end, seconds) in ends(WIDTH).iter().zip(seconds[*scene]) {
-                if is_of(row, end) {
+                if row.is_of(end) {
                     row.measured_seconds = Some(seconds);
                 }
             }
@@ -549,7 +518,7 @@ mod tests {
         assert_eq!((&*gain, &*what), ("0.80×", "measured time, median"));
         // No mean of fewer scenes than there are.
         let default = Combination::default_of(WIDTH);
-        let last = rows.iter_mut().rfind(|(_, row)| is_of(row, &default));
+        let last = rows.iter_mut().rfind(|(_, row)| row.is_of(&default));
         last.expect("a row").1.measured_seconds = None;
         assert_eq!(card(&Summary::new(&two, &rows)), None);
     }

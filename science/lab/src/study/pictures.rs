@@ -91,16 +91,11 @@ pub struct Files {
 impl Files {
     /// The names that a combination has.
     pub fn new(plan: &Plan, subject: &Subject, combination: &Combination) -> Self {
-        let Combination {
-            width,
-            tree,
-            collapse,
-            order,
-            prim_cost,
-        } = combination;
+        let Combination { tree, collapse, .. } = combination;
+        let width = combination.width;
         let picture = format!("{}-w{width}", subject.stem);
-        let mut order = order_stem(*order);
-        if let Some(cost) = prim_cost {
+        let mut order = order_stem(combination.order);
+        if let Some(cost) = combination.prim_cost {
             order.push_str(&format!("-cp{cost}"));
         }
         let tests = if (*tree, *collapse) == plan.base() {

@@ -153,14 +153,9 @@ pub struct Replay {
 
 impl Combination {
     fn key(&self) -> String {
-        let Self {
-            width,
-            tree,
-            collapse,
-            order,
-            prim_cost,
-        } = self;
-        let prim_cost = prim_cost.map(|cost| format!(" C_p {cost}"));
+        let Self { width, tree, .. } = self;
+        let (collapse, order) = (self.collapse, self.order);
+        let prim_cost = self.prim_cost.map(|cost| format!(" C_p {cost}"));
         let prim_cost = prim_cost.unwrap_or_default();
         format!("w{width} {tree} {collapse} {order}{prim_cost}")
     }
@@ -175,6 +170,16 @@ impl Rendering {
 }
 
 impl Replay {
+    fn new(part: Part, kind: Kind, trained: Trained, combination: Combination) -> Self {
+        Self {
+            part,
+            kind,
+            trained,
+            log_rays: None,
+            combination,
+        }
+    }
+
     /// A name that no other piece of work of the same scene has.
     pub fn key(&self, subject: &Subject) -> String {
         let size = self.log_rays.map(|rays| format!(" {rays}"));
@@ -305,12 +310,9 @@ impl Plan {
         for kind in Kind::ALL {
             for tree in self.trees_and_collapses() {
                 for &width in &self.widths {
-                    all.extend(self.orders.iter().map(|&order| Replay {
-                        part: Part::Techniques,
-                        kind,
-                        trained: main,
-                        log_rays: None,
-                        combination: Combination::new(width, tree, order),
+                    all.extend(self.orders.iter().map(|&order| {
+                        let combination = Combination::new(width, tree, order);
+                        Replay::new(Part::Techniques, kind, main, combination)
                     }));
                 }
             }
@@ -328,11 +330,13 @@ impl Plan {
             for &width in &self.widths {
                 let learning = self.orders.iter().filter(|o| o.log_kind().is_some());
                 all.extend(learning.map(|&order| Replay {
-                    part: Part::LogSize,
-                    kind,
-                    trained,
                     log_rays: Some(size),
-                    combination: Combination::new(width, self.base(), order),
+                    ..Replay::new(
+                        Part::LogSize,
+                        kind,
+                        trained,
+                        Combination::new(width, self.base(), order),
+                    )
                 }));
             }
         }
@@ -357,13 +361,8 @@ impl Plan {
             for &collapse in &self.collapses {
                 for &width in &self.widths {
                     let order = self.default_order();
-                    all.push(Replay {
-                        part: Part::Transfer,
-                        kind,
-                        trained,
-                        log_rays: None,
-                        combination: Combination::new(width, (tree, collapse), order),
-                    });
+                    let combination = Combination::new(width, (tree, collapse), order);
+                    all.push(Replay::new(Part::Transfer, kind, trained, combination));
                 }
             }
         }

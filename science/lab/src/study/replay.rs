@@ -205,13 +205,7 @@ impl<'a> Bench<'a> {
         let oracle = match self.oracle {
             // The oracle of a tree is the same for all its orders, which follow each other.
             Some((of, oracle)) if replay.shares_collapse(&of) && replay.shares_tree(&of) => oracle,
-            _ => {
-                let visits = oracle_visits(collapsed.bvh(), rays);
-                [
-                    (visits.occluded_rays > 0).then(|| visits.occluded()),
-                    (visits.unoccluded_rays > 0).then(|| visits.unoccluded()),
-                ]
-            }
+            _ => oracle(collapsed.bvh(), rays),
         };
         self.oracle = Some((*replay, oracle));
         let ordered = collapsed.order(replay.combination.order)?;
@@ -219,14 +213,7 @@ impl<'a> Bench<'a> {
         let trees = [&reference.bvh, &ordered.bvh];
         let ([speeds, seconds], equal) = timed(trees, rays, &reference.answers);
         let equal_answers = equal && answers == reference.answers;
-        let mean = |tests: fn(&Cost) -> u32, chosen: Option<bool>| {
-            let of = costs.iter().zip(&answers);
-            let of = of.filter(|(_, occluded)| chosen.is_none_or(|chosen| **occluded == chosen));
-            let (sum, count) = of.fold((0, 0), |(sum, count), (cost, _)| {
-                (sum + u64::from(tests(cost)), count + 1)
-            });
-            (count > 0).then(|| sum as f64 / f64::from(count))
-        };
+        let mean = |tests, chosen| mean_of((&costs, &answers), tests, chosen);
         let node_tests = |cost: &Cost| cost.node_tests;
         let occluded = answers.iter().filter(|occluded| **occluded).count();
         let row = Row {
@@ -258,6 +245,29 @@ impl<'a> Bench<'a> {
         self.reference = Some(reference);
         Ok(row)
     }
+}
+
+/// Means of the oracle's node tests of the occluded rays and of the others; `None` without such rays.
+fn oracle(bvh: &Bvh, rays: &[Ray]) -> [Option<f64>; 2] {
+    let visits = oracle_visits(bvh, rays);
+    [
+        (visits.occluded_rays > 0).then(|| visits.occluded()),
+        (visits.unoccluded_rays > 0).then(|| visits.unoccluded()),
+    ]
+}
+
+/// Means of tests over all rays, or over those with one answer; `None` without such rays.
+fn mean_of(
+    (costs, answers): (&[Cost], &[bool]),
+    tests: fn(&Cost) -> u32,
+    chosen: Option<bool>,
+) -> Option<f64> {
+    let of = costs.iter().zip(answers);
+    let of = of.filter(|(_, occluded)| chosen.is_none_or(|chosen| **occluded == chosen));
+    let (sum, count) = of.fold((0, 0), |(sum, count), (cost, _)| {
+        (sum + u64::from(tests(cost)), count + 1)
+    });
+    (count > 0).then(|| sum as f64 / f64::from(count))
 }
 
 /// Speeds of the second of two trees over the first, and its seconds, each from the least: CPU time of interleaved rounds. Then

@@ -241,6 +241,19 @@ impl Row {
         tests.map(|(nodes, prims)| f64::from(costs.node) * nodes + f64::from(costs.prim) * prims)
     }
 
+    /// Whether it is of replayed rays of a kind, and of a part of the study.
+    pub fn is_replay(&self, kind: Kind, part: Part) -> bool {
+        self.by == By::Replay && self.rays == kind && self.part == part
+    }
+
+    /// Whether it is of a combination.
+    pub fn is_of(&self, combination: &Combination) -> bool {
+        self.width == combination.width.lanes()
+            && self.is_on(combination.tree.name(), combination.collapse.name())
+            && self.order == combination.order.name()
+            && (combination.prim_cost).is_none_or(|cost| self.prim_cost == cost)
+    }
+
     /// Whether this is about that tree and collapse.
     pub fn is_on(&self, tree: &str, collapse: &str) -> bool {
         self.tree == tree && self.collapse == collapse
