@@ -15,10 +15,12 @@ mod with_parry;
 use std::convert::Infallible;
 use std::path::PathBuf;
 
-use antumbra_lab::harness::{Answers, Bench, Row, TOLERANCE, interleave, median, ratios, spread};
+use antumbra_lab::harness::{
+    Answers, Bench, Mesh, Row, TOLERANCE, interleave, median, ratios, spread,
+};
 use antumbra_lab::thread_seconds;
 
-use input::{Mesh, Ray};
+use input::Ray;
 
 /// What a program found: which rays are occluded; or distances of closest hits, and which of the hits lie in shadow.
 #[derive(Clone, Default)]

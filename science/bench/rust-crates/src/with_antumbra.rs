@@ -14,10 +14,7 @@ fn ray(ray: &Ray) -> KernelRay {
 }
 
 fn build(mesh: &Mesh) -> Bvh {
-    let geometry = [Geometry::triangles(
-        &mesh.positions[..],
-        &mesh.triangles[..],
-    )];
+    let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
     Bvh::build(&geometry, &Recipe::default()).expect("indices in range")
 }
 
@@ -49,10 +46,7 @@ pub fn see(mesh: &Mesh, points: &[[f32; 3]], timed: &mut Timed) -> Found {
 // instances
 pub fn shade(mesh: &Mesh, places: &[[[f32; 4]; 3]], rays: &[Ray], timed: &mut Timed) -> Found {
     let bvh = timed.build(|| {
-        let geometry = [Geometry::triangles(
-            &mesh.positions[..],
-            &mesh.triangles[..],
-        )];
+        let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
         let places: Vec<_> = places
             .iter()
             .map(|&transform| Instance::new(0, transform))

@@ -47,7 +47,7 @@ struct Tree {
 }
 
 fn build(mesh: &Mesh) -> Tree {
-    let mut triangles: Vec<Triangle> = (0..mesh.triangles.len())
+    let mut triangles: Vec<Triangle> = (0..mesh.indices.len())
         .map(|triangle| Triangle {
             corners: mesh.corners(triangle).map(Point3::from),
             node: 0,

@@ -20,7 +20,7 @@ struct Tree {
 }
 
 fn build(mesh: &Mesh) -> Tree {
-    let triangles: Vec<Triangle> = (0..mesh.triangles.len())
+    let triangles: Vec<Triangle> = (0..mesh.indices.len())
         .map(|triangle| {
             let [v0, v1, v2] = mesh.corners(triangle).map(Vec3A::from);
             Triangle { v0, v1, v2 }

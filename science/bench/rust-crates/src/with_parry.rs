@@ -4,13 +4,11 @@
 //! place on it. Parry's distances are in single precision.
 
 use antumbra::{Aabb, Bvh, Geometry, Recipe};
-use antumbra_lab::harness::{Bench, Case, each};
+use antumbra_lab::harness::{Bench, Case, Mesh, cross, dot, each, less};
 use antumbra_testkit::Rng;
 use parry3d::math::Vector;
 use parry3d::query::PointQueryWithLocation;
 use parry3d::shape::TriMesh;
-
-use crate::input::{Mesh, cross, dot, minus};
 
 /// Points on each side of the grid.
 const GRID: usize = 64;
@@ -18,13 +16,10 @@ const GRID: usize = 64;
 const TOLERANCE: f32 = 1e-4;
 
 pub fn run(bench: &mut Bench, name: &str, mesh: &Mesh) -> Result<(), Box<dyn std::error::Error>> {
-    let geometry = [Geometry::triangles(
-        &mesh.positions[..],
-        &mesh.triangles[..],
-    )];
+    let geometry = [Geometry::triangles(&mesh.positions[..], &mesh.indices[..])];
     let bvh = Bvh::build(&geometry, &Recipe::default())?;
     let corners = mesh.positions.iter().map(|&corner| Vector::from(corner));
-    let parry = TriMesh::new(corners.collect(), mesh.triangles.clone()).expect("triangles");
+    let parry = TriMesh::new(corners.collect(), mesh.indices.clone()).expect("triangles");
     let (bounds, count) = (bvh.bounds(), bench.rays());
     for (kind, points) in [
         ("uniform", uniform(&bounds, count)),
@@ -63,12 +58,12 @@ fn near_surface(bounds: &Aabb, mesh: &Mesh, count: usize) -> Vec<[f32; 3]> {
     let length = |v: [f32; 3]| dot(v, v).sqrt();
     let mut sum = 0.0;
     let mut sums = Vec::new();
-    for triangle in 0..mesh.triangles.len() {
+    for triangle in 0..mesh.indices.len() {
         let [a, b, c] = mesh.corners(triangle);
-        sum += f64::from(length(cross(minus(b, a), minus(c, a))));
+        sum += f64::from(length(cross(less(b, a), less(c, a))));
         sums.push(sum);
     }
-    let far = 0.01 * length(minus(bounds.max, bounds.min));
+    let far = 0.01 * length(less(bounds.max, bounds.min));
     let mut rng = Rng::new(2);
     let point = |_| {
         let place = f64::from(rng.unit()) * sum;

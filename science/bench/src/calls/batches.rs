@@ -5,10 +5,9 @@ use std::ops::Range;
 use antumbra::inputs::Column;
 use antumbra::{Hit, Masks, PrimId, Ray, RayColumns};
 use antumbra_lab::embree::{Call, Scene, SceneFlags};
-use antumbra_lab::harness::{Bench, Case, each};
+use antumbra_lab::harness::{Bench, Case, Mesh, each};
 
 use crate::Outcome;
-use crate::input::Mesh;
 
 /// Rays of a batch.
 const SIZES: [usize; 12] = [1, 2, 4, 8, 12, 16, 24, 32, 64, 256, 1000, 16384];
@@ -71,48 +70,36 @@ pub fn conditions(bench: &mut Bench, name: &str, mesh: &Mesh, rays: &[Ray]) -> O
     let free = || vec![false; rays.len()];
     let none = || vec![None; rays.len()];
     let mut case = Case::new(name, rays.len());
-    case.base("occluded", free(), |all| {
-        pieces(all, |range, all| batch(range).occluded_into(all))
-    });
-    case.add("occluded, mask", free(), |all| {
-        pieces(all, |range, all| mask(range).occluded_into(all))
-    });
-    case.add("occluded, except", free(), |all| {
-        pieces(all, |range, all| {
-            batch(range.clone())
-                .except(&excluded[range])
-                .occluded_into(all)
-        });
-    });
-    case.add("occluded, filter", free(), |all| {
-        pieces(all, |range, all| {
-            batch(range).filter(&accept).occluded_into(all)
-        });
-    });
-    case.add("occluders", vec![None; rays.len()], |all| {
-        pieces(all, |range, all| batch(range).occluders_into(all));
-    });
-    case.base("intersect", none(), |all| {
-        pieces(all, |range, all| batch(range).intersect_into(all))
-    });
-    case.add("intersect, mask", none(), |all| {
-        pieces(all, |range, all| mask(range).intersect_into(all))
-    });
-    case.add("intersect, filter", none(), |all| {
-        pieces(all, |range, all| {
-            batch(range).filter(&accept).intersect_into(all)
-        });
-    });
-    case.add("surfaces", vec![None; rays.len()], |all| {
-        pieces(all, |range, all| batch(range).surfaces_into(all));
-    });
+    let occluded = |range, all: &mut _| batch(range).occluded_into(all);
+    case.base("occluded", free(), pieces(occluded));
+    let of_mask = |range, all: &mut _| mask(range).occluded_into(all);
+    case.add("occluded, mask", free(), pieces(of_mask));
+    let except = |range: Range<usize>, all: &mut _| {
+        let batch = batch(range.clone());
+        batch.except(&excluded[range]).occluded_into(all);
+    };
+    case.add("occluded, except", free(), pieces(except));
+    let filter = |range, all: &mut _| batch(range).filter(&accept).occluded_into(all);
+    case.add("occluded, filter", free(), pieces(filter));
+    let occluders = |range, all: &mut _| batch(range).occluders_into(all);
+    case.add("occluders", vec![None; rays.len()], pieces(occluders));
+    let intersect = |range, all: &mut _| batch(range).intersect_into(all);
+    case.base("intersect", none(), pieces(intersect));
+    let of_mask = |range, all: &mut _| mask(range).intersect_into(all);
+    case.add("intersect, mask", none(), pieces(of_mask));
+    let filter = |range, all: &mut _| batch(range).filter(&accept).intersect_into(all);
+    case.add("intersect, filter", none(), pieces(filter));
+    let surfaces = |range, all: &mut _| batch(range).surfaces_into(all);
+    case.add("surfaces", vec![None; rays.len()], pieces(surfaces));
     Ok(case.run(bench, [0.0; 2])?)
 }
 
 /// Answers in pieces, of as many rays as a call has.
-fn pieces<A>(answers: &mut [A], mut call: impl FnMut(Range<usize>, &mut [A])) {
-    for (index, piece) in answers.chunks_mut(CALL).enumerate() {
-        call(CALL * index..CALL * index + piece.len(), piece);
+fn pieces<A>(mut call: impl FnMut(Range<usize>, &mut [A])) -> impl FnMut(&mut [A]) {
+    move |answers| {
+        for (index, piece) in answers.chunks_mut(CALL).enumerate() {
+            call(CALL * index..CALL * index + piece.len(), piece);
+        }
     }
 }
 

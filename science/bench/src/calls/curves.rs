@@ -3,11 +3,10 @@
 use antumbra::shapes::Curves;
 use antumbra::{Bvh, Geometry, Ray, Recipe};
 use antumbra_lab::embree::{Call, Scene, SceneFlags};
-use antumbra_lab::harness::{Bench, Case, TOLERANCE, each};
+use antumbra_lab::harness::{Bench, Case, TOLERANCE, dot, each, model};
 use antumbra_testkit::Rng;
 
 use crate::Outcome;
-use crate::input::{dot, model};
 
 /// Hairs of a scene, and segments of a hair.
 const HAIRS: usize = 20_000;

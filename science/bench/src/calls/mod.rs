@@ -8,10 +8,10 @@ mod saved;
 mod transmission;
 
 use antumbra::Ray;
-use antumbra_lab::harness::Bench;
+use antumbra_lab::harness::{Bench, Mesh};
 
 use crate::Outcome;
-use crate::input::{Input, Mesh};
+use crate::input::Input;
 
 /// Measures a case, of these scenes if it is about scenes.
 type Run = fn(&mut Bench, &[String]) -> Outcome;

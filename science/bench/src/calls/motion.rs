@@ -2,12 +2,11 @@
 
 use antumbra::{Bvh, Geometry, Instance, Ray, Recipe};
 use antumbra_lab::embree::{Call, Scene, SceneFlags};
-use antumbra_lab::harness::{Bench, Case};
+use antumbra_lab::harness::{Bench, Case, Mesh, dot, model, unit};
 use antumbra_render::Lowered;
 use antumbra_testkit::{Rng, mesh};
 
 use crate::Outcome;
-use crate::input::{Mesh, dot, model, unit};
 
 /// Rays of a scene: what one thread takes at a time.
 const RAYS: usize = 1 << 14;

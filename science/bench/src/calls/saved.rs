@@ -4,11 +4,10 @@ use std::hint::black_box;
 
 use antumbra::recipe::Engine;
 use antumbra::{Bvh, Instance, Object, Recipe, Width, World};
-use antumbra_lab::harness::{Bench, Case};
+use antumbra_lab::harness::{Bench, Case, Mesh};
 use antumbra_testkit::Rng;
 
 use crate::Outcome;
-use crate::input::Mesh;
 
 /// Boxes along each side of the city.
 const BOXES: usize = 360;

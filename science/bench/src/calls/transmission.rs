@@ -1,10 +1,9 @@
 //! Coloured shadows: light along rays through panes of glass, ray by ray and in a batch.
 
 use antumbra::{Aabb, Bvh, Hit, Ray, Recipe, Visit};
-use antumbra_lab::harness::{Bench, Case};
+use antumbra_lab::harness::{Bench, Case, Mesh, dot, less};
 
 use crate::Outcome;
-use crate::input::{Mesh, dot, less};
 
 /// Panes in a scene, each a hundredth of its diagonal wide.
 const PANES: usize = 4000;

@@ -3,12 +3,13 @@
 use antumbra::{Bvh, Ray};
 use antumbra_bake::{AmbientOcclusion, ambient_occlusion, ambient_rays};
 use antumbra_lab::embree::{Call, Scene, SceneFlags};
+use antumbra_lab::harness::{Mesh, cross, unit};
 use antumbra_lab::thread_seconds as seconds;
 use antumbra_testkit::Rng;
 
 use super::{Job, Programs};
 use crate::Outcome;
-use crate::input::{Mesh, Sensors, along_curve, cross, origin_offset, unit};
+use crate::input::{Sensors, along_curve, origin_offset};
 
 pub fn run(job: &mut Job, mesh: &Mesh, sensors: &Sensors, samples: u32) -> Outcome {
     let options = AmbientOcclusion {

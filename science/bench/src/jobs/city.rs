@@ -3,7 +3,8 @@
 use antumbra_bake::{Atlas, Error};
 use antumbra_testkit::Rng;
 
-use crate::input::{Mesh, Sensors, cross, dot, less, unit};
+use crate::input::Sensors;
+use antumbra_lab::harness::{Mesh, cross, dot, less, unit};
 
 /// Blocks along each side.
 const BLOCKS: u32 = 20;

@@ -2,10 +2,10 @@
 
 use antumbra::{Aabb, Bvh, ClosestPoint};
 use antumbra_lab::embree::{Scene, SceneFlags};
+use antumbra_lab::harness::{Mesh, dot};
 
 use super::{Job, Programs, differing};
 use crate::Outcome;
-use crate::input::{Mesh, dot};
 
 /// Whether Embree's program begins a search within what the point before allows.
 const WAYS: [(&str, bool); 2] = [("point query", false), ("point query, bounded", true)];

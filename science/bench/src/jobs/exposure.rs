@@ -5,10 +5,11 @@ use antumbra_bake::{
     Orientation, Place, Refraction, SkyDivision, Weighting, sky_view, sun_hours, sun_positions,
 };
 use antumbra_lab::embree::{Call, Scene, SceneFlags};
+use antumbra_lab::harness::{Mesh, dot};
 
 use super::{Job, Programs, differing};
 use crate::Outcome;
-use crate::input::{Mesh, Sensors, along_curve, dot, origin_offset};
+use crate::input::{Sensors, along_curve, origin_offset};
 
 /// What a packet of Embree holds.
 #[derive(Clone, Copy)]

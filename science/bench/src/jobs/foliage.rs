@@ -2,11 +2,11 @@
 
 use antumbra::{Bvh, Hit, Ray, Visit};
 use antumbra_lab::embree::{Call, Scene, SceneFlags};
+use antumbra_lab::harness::{Mesh, cross, unit};
 use antumbra_testkit::Rng;
 
 use super::{Job, Programs, differing};
 use crate::Outcome;
-use crate::input::{Mesh, cross, unit};
 
 /// Leaves in a volume of 100 x 100 x 20 metres, each 0.4 metres wide.
 const LEAVES: usize = 200_000;

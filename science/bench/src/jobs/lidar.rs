@@ -2,11 +2,12 @@
 
 use antumbra::{Bvh, Ray};
 use antumbra_lab::embree::{Call, Scene, SceneFlags};
+use antumbra_lab::harness::Mesh;
 use antumbra_testkit::Rng;
 
 use super::{Job, Programs, differing};
 use crate::Outcome;
-use crate::input::{Mesh, Sensors};
+use crate::input::Sensors;
 
 const BEAMS: usize = 64;
 const AZIMUTHS: usize = 2048;

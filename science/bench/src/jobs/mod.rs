@@ -17,11 +17,11 @@ use std::path::Path;
 use antumbra::{Bvh, Ray};
 use antumbra_bake::{SkyDivision, vertex_normals};
 use antumbra_lab::embree::{Scene, SceneFlags};
-use antumbra_lab::harness::{Bench, Row, interleave, median, ratios, spread};
+use antumbra_lab::harness::{Bench, Mesh, Row, interleave, median, ratios, spread};
 use antumbra_lab::thread_seconds as seconds;
 
 use crate::Outcome;
-use crate::input::{Mesh, Sensors};
+use crate::input::Sensors;
 use city::City;
 
 /// Turns of each program.

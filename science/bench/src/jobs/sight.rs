@@ -3,11 +3,12 @@
 use antumbra::{Bvh, Ray, Recipe};
 use antumbra_bake::{HeightField, Observer, ViewshedJob, sees_each_other};
 use antumbra_lab::embree::{Call, Scene, SceneFlags};
+use antumbra_lab::harness::{Mesh, dot, less};
 use antumbra_testkit::Rng;
 
 use super::{Job, Programs};
 use crate::Outcome;
-use crate::input::{Mesh, along_curve, dot, less, origin_offset};
+use crate::input::{along_curve, origin_offset};
 
 /// Which points see each other.
 pub fn matrix(job: &mut Job, mesh: &Mesh, points: &[[f32; 3]]) -> Outcome {

@@ -7,6 +7,8 @@ use antumbra::cutout::{Candidate, Opacity, QueryKind};
 use antumbra::shapes::{TriangleMesh, UserGeometry};
 use antumbra::{INVALID_ID, PrimId};
 
+use glam::Vec3;
+
 use super::{RayHit, SingleRay};
 
 /// Opacity of the mesh that a filter function is called for: its user data.
@@ -299,16 +301,12 @@ pub unsafe extern "C" fn nearer(arguments: *mut PointArguments) -> bool {
 /// Square of the distance of a point from a triangle, by the region of its plane that the point is above (Ericson 2004,
 /// "Real-Time Collision Detection", 5.1.5).
 fn distance2(point: [f32; 3], [a, b, c]: [[f32; 3]; 3]) -> f32 {
-    let minus = |p: [f32; 3], q: [f32; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
-    let dot = |p: [f32; 3], q: [f32; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
-    let (ab, ac) = (minus(b, a), minus(c, a));
-    let to = |s: f32, t: f32| {
-        let off = [0, 1, 2].map(|axis| point[axis] - a[axis] - s * ab[axis] - t * ac[axis]);
-        dot(off, off)
-    };
-    let along = |corner: [f32; 3]| {
-        let off = minus(point, corner);
-        (dot(ab, off), dot(ac, off))
+    let [point, a, b, c] = [point, a, b, c].map(Vec3::from);
+    let (ab, ac) = (b - a, c - a);
+    let to = |s: f32, t: f32| (point - a - s * ab - t * ac).length_squared();
+    let along = |corner: Vec3| {
+        let off = point - corner;
+        (ab.dot(off), ac.dot(off))
     };
     let (b_at_a, c_at_a) = along(a);
     if b_at_a <= 0.0 && c_at_a <= 0.0 {

@@ -5,6 +5,7 @@
 //! threads have run. The first round warms up, and its answers are kept to be compared.
 
 mod case;
+mod mesh;
 
 use std::sync::{Mutex, PoisonError};
 
@@ -17,6 +18,7 @@ use crate::thread_time;
 use crate::watch::{self, Watcher};
 
 pub use case::{Bench, Case, Row};
+pub use mesh::{Mesh, cross, dot, less, model, unit};
 
 /// Relative difference of distances that is put down to rounding in other kernels.
 pub const TOLERANCE: f32 = 1e-4;

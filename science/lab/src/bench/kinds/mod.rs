@@ -21,11 +21,11 @@ use super::ours::{Api, Ingredients, Ours, Tree};
 use super::record::{Check, KindRow};
 use super::rival::{Rival, Variant};
 use crate::embree::{self, Device, Embree, Scene, SceneFlags};
-use crate::harness::{self, Answers, Work, median, median_ratio};
+use crate::harness::{self, Answers, Mesh, Work, median, median_ratio, model};
 use crate::watch::Watcher;
 use crate::{Error, Rays};
 use asked::{Asked, Condition};
-use shapes::Merged;
+use shapes::{holes, quads, user};
 
 /// Rays, or points, of each kind that are compared with brute force.
 const BRUTE_RAYS: usize = 64;
@@ -56,7 +56,7 @@ pub struct Found {
 /// Measures everything on one thread. A scene with instances, or without a mesh, has no rows.
 pub fn measure(plan: &Plan) -> Result<Found, Error> {
     let mut found = Found::default();
-    let mesh = Merged::new(plan.model);
+    let mesh = Mesh::of(plan.model);
     if !plan.model.instances.is_empty() || mesh.indices.is_empty() {
         plan.watcher.note(&format!(
             "{}: kinds are measured in scenes of one level only",
@@ -190,15 +190,28 @@ fn case(
     Ok(())
 }
 
+/// The primitives that rays start on.
+fn starts(tree: &Tree, rays: &[Ray]) -> Vec<PrimId> {
+    let start = |ray: &Ray| {
+        let near = tree.bvh.closest(ray.org, f32::INFINITY);
+        near.map_or(PrimId::NONE, |near| PrimId {
+            prim_id: near.prim_id,
+            geom_id: near.geom_id,
+            inst_id: near.inst_id,
+        })
+    };
+    rays.iter().map(start).collect()
+}
+
 /// Rows of all queries by rays.
 fn rays(
     plan: &Plan,
-    mesh: &Merged,
+    mesh: &Mesh,
     device: Option<&Arc<Device>>,
     found: &mut Found,
 ) -> Result<(), Error> {
     const KINDS: [&str; 4] = ["triangles", "quads", "user", "filter"];
-    let models = [mesh.triangles(), mesh.quads(), mesh.user(), mesh.holes()].map(shapes::lowered);
+    let models = [mesh.geometry(), quads(mesh), user(mesh), holes(mesh)].map(model);
     let mut primitives = Vec::new();
     for model in &models[..3] {
         primitives.push(model.primitives()?);
@@ -217,17 +230,7 @@ fn rays(
         if rays.is_empty() {
             continue;
         }
-        // The primitives that the rays start on.
-        let start = |ray: &Ray| trees[0].bvh.closest(ray.org, f32::INFINITY);
-        let starts: Vec<PrimId> = (rays.iter())
-            .map(|ray| {
-                start(ray).map_or(PrimId::NONE, |start| PrimId {
-                    prim_id: start.prim_id,
-                    geom_id: start.geom_id,
-                    inst_id: start.inst_id,
-                })
-            })
-            .collect();
+        let starts = starts(&trees[0], rays);
         let mut engines: Vec<(&'static str, Box<dyn Engine + '_>)> = Vec::new();
         for (kind, scene) in KINDS.into_iter().zip(&scenes) {
             let variant = Variant::Default;
@@ -239,14 +242,12 @@ fn rays(
             }
             for (kind, condition) in Condition::all(&starts) {
                 let tree = &trees[0];
-                engines.push((
-                    kind,
-                    Box::new(Asked {
-                        tree,
-                        api,
-                        condition,
-                    }),
-                ));
+                let asked = Asked {
+                    tree,
+                    api,
+                    condition,
+                };
+                engines.push((kind, Box::new(asked)));
             }
         }
         let entries = engines

@@ -4,23 +4,22 @@ use std::sync::Arc;
 
 use antumbra::{Brute, Ray};
 
-use super::shapes::{self, Merged};
 use super::{Entry, Found, Plan, Questions, case};
 use crate::Error;
 use crate::bench::engine::Engine;
 use crate::bench::ours::{Api, Ours};
 use crate::bench::rival::Rival;
 use crate::embree::{Device, Scene, SceneFlags};
-use crate::harness::{each, work};
+use crate::harness::{Mesh, each, work};
 
 /// Adds rows.
 pub fn measure(
     plan: &Plan,
-    mesh: &Merged,
+    mesh: &Mesh,
     device: Option<&Arc<Device>>,
     found: &mut Found,
 ) -> Result<(), Error> {
-    let model = shapes::lowered(mesh.triangles());
+    let model = mesh.model();
     let primitives = model.primitives()?;
     let tree = plan.tree(&primitives)?;
     let points = &points(plan)[..];
@@ -29,7 +28,7 @@ pub fn measure(
     }
     let scene = device.map(|device| Scene::build(device, &model, SceneFlags::default()));
     let scene = scene.transpose()?;
-    let (bvh, triangles) = (&tree.bvh, &mesh.mesh());
+    let (bvh, triangles) = (&tree.bvh, &mesh.triangles());
     let nearest = vec![None; points.len()];
     let ours = |api, work| Entry {
         kind: "points",

@@ -3,78 +3,38 @@
 use std::sync::Arc;
 
 use antumbra::cutout::{Candidate, Opacity};
-use antumbra::shapes::{TriangleMesh, UserGeometry, UserHit};
+use antumbra::shapes::{UserGeometry, UserHit};
 use antumbra::{Aabb, Geometry, Ray};
-use antumbra_render::Lowered;
+use glam::Vec3;
 
-/// All meshes of a world as one.
-#[derive(Clone, Debug, Default)]
-pub struct Merged {
-    pub positions: Vec<[f32; 3]>,
-    pub indices: Vec<[u32; 3]>,
+use crate::harness::Mesh;
+
+/// Two triangles in a row that run along a common edge in opposite directions become a quad, others a quad with its last
+/// two corners in one place: the same surfaces.
+pub fn quads(mesh: &Mesh) -> Geometry<'_> {
+    let mut quads = Vec::with_capacity(mesh.indices.len());
+    let mut rest = &mesh.indices[..];
+    while let [first, others @ ..] = rest {
+        let joined = others.first().and_then(|second| join(*first, *second));
+        quads.push(joined.unwrap_or([first[0], first[1], first[2], first[2]]));
+        rest = if joined.is_some() {
+            &others[1..]
+        } else {
+            others
+        };
+    }
+    Geometry::quads(&mesh.positions[..], quads)
 }
 
-impl Merged {
-    pub fn new(model: &Lowered) -> Self {
-        let mut merged = Self::default();
-        for geometry in &model.world {
-            if let Geometry::Triangles(mesh) = geometry {
-                let first = merged.positions.len() as u32;
-                merged.positions.extend_from_slice(&mesh.positions);
-                let indices = mesh.indices.iter();
-                merged
-                    .indices
-                    .extend(indices.map(|triangle| triangle.map(|index| first + index)));
-            }
-        }
-        merged
-    }
-
-    /// The mesh, for Embree.
-    pub fn mesh(&self) -> TriangleMesh<'_> {
-        TriangleMesh::new(&self.positions[..], &self.indices[..])
-    }
-
-    pub fn triangles(&self) -> Geometry<'_> {
-        Geometry::Triangles(self.mesh())
-    }
-
-    /// Two triangles in a row that run along a common edge in opposite directions become a quad, others a quad with its last
-    /// two corners in one place: the same surfaces.
-    pub fn quads(&self) -> Geometry<'_> {
-        let mut quads = Vec::with_capacity(self.indices.len());
-        let mut rest = &self.indices[..];
-        while let [first, others @ ..] = rest {
-            let joined = others.first().and_then(|second| join(*first, *second));
-            quads.push(joined.unwrap_or([first[0], first[1], first[2], first[2]]));
-            rest = if joined.is_some() {
-                &others[1..]
-            } else {
-                others
-            };
-        }
-        Geometry::quads(&self.positions[..], quads)
-    }
-
-    pub fn user(&self) -> Geometry<'_> {
-        let corners = (self.indices.iter())
-            .map(|triangle| triangle.map(|index| self.positions[index as usize]))
-            .collect();
-        Geometry::user(self.indices.len() as u32, Arc::new(Triangles { corners }))
-    }
-
-    /// The mesh with a filter, for Embree.
-    pub fn holes(&self) -> Geometry<'_> {
-        Geometry::cutouts(&self.positions[..], &self.indices[..], Arc::new(Sieve))
-    }
+pub fn user(mesh: &Mesh) -> Geometry<'_> {
+    let count = mesh.indices.len();
+    let corners = (0..count).map(|index| mesh.corners(index)).collect();
+    Geometry::user(count as u32, Arc::new(Triangles { corners }))
 }
 
-/// A model of one geometry.
-pub fn lowered(geometry: Geometry<'_>) -> Lowered<'_> {
-    Lowered {
-        world: vec![geometry],
-        ..Lowered::default()
-    }
+/// The mesh with a filter, for Embree.
+pub fn holes(mesh: &Mesh) -> Geometry<'_> {
+    Geometry::cutouts(&mesh.positions[..], &mesh.indices[..], Arc::new(Sieve))
 }
 
 /// The quad `[a, b, c, d]` whose halves, the triangles (a, b, d) and (c, d, b), are two given ones.
@@ -119,31 +79,19 @@ struct Triangles {
 
 impl UserGeometry for Triangles {
     fn bounds(&self, prim_id: u32) -> Aabb {
-        let [a, b, c] = self.corners[prim_id as usize];
-        Aabb {
-            min: [0, 1, 2].map(|axis| a[axis].min(b[axis]).min(c[axis])),
-            max: [0, 1, 2].map(|axis| a[axis].max(b[axis]).max(c[axis])),
-        }
+        Aabb::around(&self.corners[prim_id as usize])
     }
 
     fn intersect(&self, prim_id: u32, ray: &Ray) -> Option<UserHit> {
-        let minus = |p: [f32; 3], q: [f32; 3]| [p[0] - q[0], p[1] - q[1], p[2] - q[2]];
-        let dot = |p: [f32; 3], q: [f32; 3]| p[0] * q[0] + p[1] * q[1] + p[2] * q[2];
-        let cross = |p: [f32; 3], q: [f32; 3]| {
-            [
-                p[1] * q[2] - p[2] * q[1],
-                p[2] * q[0] - p[0] * q[2],
-                p[0] * q[1] - p[1] * q[0],
-            ]
-        };
-        let [a, b, c] = self.corners[prim_id as usize];
-        let (ab, ac, from) = (minus(b, a), minus(c, a), minus(ray.org, a));
-        let p = cross(ray.dir, ac);
-        let det = dot(ab, p);
-        let u = dot(from, p) / det;
-        let q = cross(from, ab);
-        let v = dot(ray.dir, q) / det;
-        let t = dot(ac, q) / det;
+        let [a, b, c] = self.corners[prim_id as usize].map(Vec3::from);
+        let (org, dir) = (Vec3::from(ray.org), Vec3::from(ray.dir));
+        let (ab, ac, from) = (b - a, c - a, org - a);
+        let p = dir.cross(ac);
+        let det = ab.dot(p);
+        let u = from.dot(p) / det;
+        let q = from.cross(ab);
+        let v = dir.dot(q) / det;
+        let t = ac.dot(q) / det;
         let inside = u >= 0.0 && v >= 0.0 && u + v <= 1.0;
         (inside && ray.tnear < t && t < ray.tfar).then_some(UserHit::new(t, u, v))
     }
@@ -160,11 +108,11 @@ mod tests {
         assert_eq!(join([3, 0, 1], [1, 2, 3]), Some([0, 1, 2, 3]));
         assert_eq!(join([0, 1, 2], [2, 3, 4]), None);
         assert_eq!(join([0, 1, 3], [3, 2, 1]), None);
-        let merged = Merged {
+        let merged = Mesh {
             positions: vec![[0.0; 3]; 5],
             indices: vec![[4, 0, 1], [0, 1, 3], [1, 2, 3], [0, 1, 2]],
         };
-        let Geometry::Quads(mesh) = merged.quads() else {
+        let Geometry::Quads(mesh) = quads(&merged) else {
             panic!("not quads");
         };
         assert_eq!(mesh.indices[..], [[4, 0, 1, 1], [0, 1, 2, 3], [0, 1, 2, 2]]);
