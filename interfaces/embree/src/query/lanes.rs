@@ -1,4 +1,4 @@
-//! Many rays: packets of 4, 8 and 16, and streams as in Embree 3.
+//! Many rays: packets of 4, 8 and 16, and streams of single rays as in Embree 3.
 //!
 //! Plain rays go to the kernel in batches, which form packets and streams of their own. Others are answered one by one.
 
@@ -244,56 +244,29 @@ unsafe fn packet<const N: usize>(
     Ok((N, lane))
 }
 
-/// Rays, or packets of `size` of them, at a stride in bytes.
+/// Rays at a stride in bytes.
 fn strided(
     query: Query,
     first: *mut f32,
-    size: u32,
-    packets: u32,
+    count: u32,
     stride: usize,
 ) -> Outcome<Lanes<impl Fn(usize) -> Option<Lane>>> {
-    if size == 0 || (first.is_null() && packets > 0) {
-        return Err(Failure::argument(
-            "a stream is null, or its packets are empty",
-        ));
+    if first.is_null() && count > 0 {
+        return Err(Failure::argument("a stream is null"));
     }
-    // Single rays with hits are padded to 24 numbers, packets never.
     let fields = match query {
         Query::Intersect => RAY_FIELDS + 9,
         Query::Occluded => RAY_FIELDS,
     };
-    let size = size as usize;
-    let bytes = 4 * fields * size;
-    if packets > 1 && (stride < bytes || !stride.is_multiple_of(4)) {
+    let bytes = 4 * fields;
+    if count > 1 && (stride < bytes || !stride.is_multiple_of(4)) {
         return Err(Failure::argument(format!(
             "a stride of {stride} bytes for rays of {bytes} bytes"
         )));
     }
     let lane = move |index: usize| {
-        let packet = first.wrapping_byte_add(index / size * stride);
-        Some(Lane {
-            first: packet.wrapping_add(index % size),
-            stride: size,
-        })
-    };
-    Ok((size * packets as usize, lane))
-}
-
-/// Pointers to rays, of which null ones are left out.
-///
-/// # Safety
-/// So many pointers.
-unsafe fn pointers(
-    rays: *const *mut f32,
-    count: u32,
-) -> Outcome<Lanes<impl Fn(usize) -> Option<Lane>>> {
-    if rays.is_null() && count > 0 {
-        return Err(Failure::argument("a pointer is null"));
-    }
-    let lane = move |index: usize| {
-        // SAFETY: so many pointers, as the client says.
-        let first = unsafe { *rays.add(index) };
-        (!first.is_null()).then_some(Lane { first, stride: 1 })
+        let first = first.wrapping_byte_add(index * stride);
+        Some(Lane { first, stride: 1 })
     };
     Ok((count as usize, lane))
 }
@@ -324,32 +297,26 @@ packets! {
     Occluded 16: rtcOccluded16 rtcTraversableOccluded16;
 }
 
-/// Declares streams, each once for both queries.
 macro_rules! streams {
-    (|$query:ident| $($intersect:ident $occluded:ident $arguments:tt: $lanes:expr;)*) => {$(
-        streams! { @ $query Intersect $intersect $arguments $lanes }
-        streams! { @ $query Occluded $occluded $arguments $lanes }
-    )*};
-    (@ $query:ident $which:ident $name:ident($($argument:ident: $type:ty),*) $lanes:expr) => {
+    ($($query:ident: $name:ident;)*) => {$(
         /// # Safety
-        /// A scene of this library, and so many rays.
+        /// A scene of this library, and so many rays, each `stride` bytes behind the one before.
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name(scene: *const Scene, context: *mut Context, $($argument: $type),*) {
-            let $query = Query::$which;
+        pub unsafe extern "C" fn $name(
+            scene: *const Scene,
+            context: *mut Context,
+            rays: *mut f32,
+            count: u32,
+            stride: usize,
+        ) {
+            let query = Query::$query;
             // SAFETY: the caller's handle and memory.
-            unsafe { stream($query, scene, context, $lanes) }
+            unsafe { stream(query, scene, context, strided(query, rays, count, stride)) }
         }
-    };
+    )*};
 }
 
 streams! {
-    |query|
-    // `count` rays, each `stride` bytes behind the one before.
-    rtcIntersect1M rtcOccluded1M(rays: *mut f32, count: u32, stride: usize):
-        strided(query, rays, 1, count, stride);
-    // Pointers to `count` rays. Null ones are left out.
-    rtcIntersect1Mp rtcOccluded1Mp(rays: *const *mut f32, count: u32): pointers(rays, count);
-    // `packets` packets of `size` rays, each `stride` bytes behind the one before.
-    rtcIntersectNM rtcOccludedNM(rays: *mut f32, size: u32, packets: u32, stride: usize):
-        strided(query, rays, size, packets, stride);
+    Intersect: rtcIntersect1M;
+    Occluded: rtcOccluded1M;
 }

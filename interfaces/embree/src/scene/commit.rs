@@ -65,25 +65,10 @@ struct Plan {
 impl Plan {
     /// Builds the trees.
     fn commit(self, scene: &Scene) -> Outcome<Committed> {
-        let mut ground = Vec::new();
-        let mut instances = Vec::new();
-        let mut seen = Vec::new();
-        for (geom_id, geometry) in &self.geometries {
-            let state = geometry.state();
-            seen.push((Arc::clone(geometry), geometry.version()));
-            if !state.is_enabled {
-                continue;
-            }
-            let placed = Placed {
-                geom_id: *geom_id,
-                geometry: Arc::clone(geometry),
-                state,
-            };
-            match geometry.kind.is_instance() {
-                true => instances.push(placed),
-                false => ground.push(placed),
-            }
-        }
+        let seen = self.geometries.iter();
+        let seen = seen.map(|(_, geometry)| (Arc::clone(geometry), geometry.version()));
+        let seen = seen.collect();
+        let (instances, ground) = self.placed();
         let monitor = Monitor {
             callback: self.progress,
             is_cancelled: AtomicBool::new(false),
@@ -129,6 +114,17 @@ impl Plan {
             traits,
             bytes,
         })
+    }
+
+    /// What is enabled: instances, and the others.
+    fn placed(&self) -> (Vec<Placed>, Vec<Placed>) {
+        let placed = (self.geometries.iter()).map(|(geom_id, geometry)| Placed {
+            geom_id: *geom_id,
+            geometry: Arc::clone(geometry),
+            state: geometry.state(),
+        });
+        let enabled = placed.filter(|placed| placed.state.is_enabled);
+        enabled.partition(|placed| placed.geometry.kind.is_instance())
     }
 
     /// How trees are built. Answers are the same by every recipe.
