@@ -4,7 +4,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
 use antumbra_image::atomic_write;
@@ -14,11 +14,11 @@ use antumbra_render::{
 use antumbra_scene::Scene;
 
 use super::looks::Looks;
-use super::until::Until;
+use super::start::Picture;
 use crate::args::RenderArgs;
 use crate::exit::{Failure, say, tell};
 use crate::output::Files;
-use crate::progress::Progress;
+use crate::progress::{Progress, lock};
 use crate::{archive, interrupt, output};
 
 /// Flag that keeps the samples of a finished picture.
@@ -72,33 +72,27 @@ pub struct Keeper<'a> {
 }
 
 impl<'a> Keeper<'a> {
-    /// For the rendering of a scene to `output`, which people look at meanwhile.
-    pub fn new(
-        args: &'a RenderArgs,
-        scene: &'a Scene,
-        options: &'a Options,
-        output: &Path,
-        looks: Looks,
-    ) -> Self {
+    /// For the rendering of a picture, which people look at meanwhile.
+    pub fn new(args: &'a RenderArgs, picture: &'a Picture) -> Result<Self, Failure> {
+        let scene = &picture.scene;
         let [x0, x1, y0, y1] = scene.film.pixel_bounds().map(u64::from);
-        let spp = options.spp.unwrap_or(scene.sampler.pixel_samples);
-        let samples = (x1 - x0) * (y1 - y0) * u64::from(spp);
-        Self {
+        let samples = (x1 - x0) * (y1 - y0) * u64::from(picture.spp());
+        Ok(Self {
             scene,
-            options,
-            path: output::checkpoint(output),
-            looks,
+            options: &picture.options,
+            path: output::checkpoint(&picture.file),
+            looks: Looks::begin(args, scene, &picture.file)?,
             every: args.checkpoint_every.0,
             order_file: args.save_order.as_deref(),
             progress: Progress::of_picture(&scene.name, samples),
-            grows: Until::of(&args.until).is_some(),
+            grows: picture.until.is_some(),
             identity: OnceLock::new(),
             last: Mutex::new(Instant::now()),
             writing: AtomicBool::new(false),
             written: AtomicBool::new(false),
             failing: AtomicBool::new(false),
             order_failure: Mutex::default(),
-        }
+        })
     }
 
     /// Identity of the rendering. Computed on first use, because large scenes take time.
@@ -337,8 +331,4 @@ impl Monitor for Keeper<'_> {
         *lock(&self.last) = Instant::now();
         self.writing.store(false, Ordering::Relaxed);
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

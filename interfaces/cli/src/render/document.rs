@@ -1,13 +1,12 @@
 //! Figures about a rendering: the JSON document, and the lines on the terminal.
 
-use std::path::Path;
-
 use antumbra_lab::{Machine, count};
 use antumbra_load::IntegratorKind;
-use antumbra_render::{Options, Rendering, Split, World};
-use antumbra_scene::Scene;
+use antumbra_render::{Split, World};
 use serde::Serialize;
 
+use super::start::Picture;
+use super::until::{Grown, noise};
 use crate::args::RenderArgs;
 use crate::exit::{detail, say, tell};
 use crate::output::text;
@@ -81,26 +80,24 @@ pub struct BusySeconds {
 }
 
 impl<'a> Document<'a> {
-    /// A document of a rendering that was not resumed.
+    /// A document of a picture; `resumed_tiles` were there before.
     pub fn new(
         args: &RenderArgs,
-        scene: &'a Scene,
-        world: &World,
-        rendering: &Rendering,
-        options: &Options,
-        file: &Path,
-        load_seconds: f64,
+        (picture, world): (&'a Picture, &World),
+        grown: &Grown,
+        resumed_tiles: Option<[usize; 2]>,
     ) -> Self {
-        let stats = &rendering.stats;
+        let (scene, options) = (&picture.scene, &picture.options);
+        let stats = &grown.rendering.stats;
         Self {
             schema: "antumbra.render/1",
             machine: version::machine(options.recipe.engine.isa()),
             seed: options.seed,
             scene: &scene.name,
-            output: text(file),
+            output: text(&picture.file),
             stderr_image: args.stderr_image.as_deref().map(text),
             shard: args.shard.map(|shard| shard.to_string()),
-            resumed_tiles: None,
+            resumed_tiles,
             resolution: scene.film.resolution,
             pixel_bounds: scene.film.pixel_bounds(),
             spp: stats.spp,
@@ -127,17 +124,17 @@ impl<'a> Document<'a> {
             prim_tests_before: stats.prim_tests_before,
             predicted_cost_before: stats.predicted_cost_before,
             predicted_cost_after: stats.predicted_cost_after,
-            load_seconds,
+            load_seconds: picture.load_seconds,
             lower_seconds: world.lower_seconds(),
             build_seconds: stats.build_seconds,
             log_seconds: stats.log_seconds,
             sort_seconds: stats.sort_seconds,
-            render_seconds: stats.render_seconds,
+            render_seconds: grown.seconds,
             busy_seconds: BusySeconds {
                 parts: stats.split,
                 total: stats.split.busy(),
             },
-            noise: None,
+            noise: noise(&grown.rendering),
             dropped_samples: stats.dropped_samples,
             dropped_at: stats.dropped_at,
             image_hash: hash_text(stats.image_hash),
@@ -152,11 +149,6 @@ pub fn hash_text(hash: u64) -> String {
 
 /// Prints counts, times and files of the rendering.
 pub fn summarise(document: &Document, split: &Split) {
-    let Document {
-        machine,
-        resolution: [x, y],
-        ..
-    } = document;
     let shapes = match document.triangles {
         0 => format!("{} spheres", count(document.primitives as u64)),
         triangles => format!("{} triangles", count(triangles as u64)),
@@ -171,6 +163,7 @@ pub fn summarise(document: &Document, split: &Split) {
             "{dropped} degenerate primitives were left out"
         ));
     }
+    let [x, y] = document.resolution;
     tell(format_args!(
         "{x} x {y} pixels, {} samples per pixel ({}), {}",
         document.spp, document.sampler, document.integrator,
@@ -184,7 +177,25 @@ pub fn summarise(document: &Document, split: &Split) {
         count(document.nodes as u64),
         document.tree_bytes as f64 / 1e6,
     ));
-    detail(format_args!("{}", machine.describe()));
+    detail(format_args!("{}", document.machine.describe()));
+    tell_work(document, split);
+    if let Some([x, y]) = document.dropped_at {
+        let dropped = count(document.dropped_samples);
+        say(format_args!(
+            "warning: {dropped} samples were negative or not finite and were left out, the first in pixel ({x}, {y})"
+        ));
+    }
+    if let Some(noise) = document.noise {
+        tell(format_args!("noise {:.2} % of the mean", 100.0 * noise));
+    }
+    tell(format_args!("wrote {}", document.output));
+    if let Some(path) = &document.stderr_image {
+        tell(format_args!("wrote {path}"));
+    }
+}
+
+/// Rays, and the time that they and the rest took.
+fn tell_work(document: &Document, split: &Split) {
     let rays = document.closest_rays + document.shadow_rays;
     tell(format_args!(
         "{} rays, {:.1} % of them shadow rays",
@@ -216,17 +227,4 @@ pub fn summarise(document: &Document, split: &Split) {
         "of {busy:.2} s of all threads: {}",
         parts.join(", ")
     ));
-    if let Some([x, y]) = document.dropped_at {
-        let dropped = count(document.dropped_samples);
-        say(format_args!(
-            "warning: {dropped} samples were negative or not finite and were left out, the first in pixel ({x}, {y})"
-        ));
-    }
-    if let Some(noise) = document.noise {
-        tell(format_args!("noise {:.2} % of the mean", 100.0 * noise));
-    }
-    tell(format_args!("wrote {}", document.output));
-    if let Some(path) = &document.stderr_image {
-        tell(format_args!("wrote {path}"));
-    }
 }

@@ -1,16 +1,40 @@
-//! Samples of an earlier run to go on from.
+//! What an earlier run has left to be done: samples to go on from.
 
-use std::path::Path;
-
-use antumbra_render::{Snapshot, World};
+use antumbra_render::{Snapshot, Task, World};
 
 use super::checkpoint::Keeper;
-use super::until::Until;
+use super::start::{self, Picture};
 use crate::args::RenderArgs;
 use crate::exit::{Failure, tell};
+use crate::scenes;
+
+/// The world of a picture, and what is left to be rendered; `None` if the picture is complete.
+pub fn task_left(
+    args: &RenderArgs,
+    picture: &Picture,
+    keeper: &Keeper<'_>,
+) -> Result<Option<(World, Task)>, Failure> {
+    let (scene, recipe) = (&picture.scene, &picture.options.recipe);
+    let lesson = start::lesson(args, scene, recipe.order)?;
+    let Earlier::Samples(found) = Earlier::find(args, picture, keeper)? else {
+        return Ok(None);
+    };
+    let world = scenes::world(scene, start::first_builder(recipe.builder))?;
+    let resume = found.and_then(|found| match picture.until {
+        None => extended(*found, &world, picture.spp()),
+        Some(_) => Some(*found),
+    });
+    let task = Task {
+        shard: args.shard.unwrap_or_default(),
+        resume,
+        lesson,
+        extendable: args.keep_samples,
+    };
+    Ok(Some((world, task)))
+}
 
 /// Work of an earlier run.
-pub enum Earlier {
+enum Earlier {
     /// The requested part is there.
     Complete,
     /// Samples to go on from, if there are any.
@@ -19,18 +43,12 @@ pub enum Earlier {
 
 impl Earlier {
     /// Looks for work of an earlier run.
-    pub fn find(
-        args: &RenderArgs,
-        until: Option<Until>,
-        keeper: &Keeper<'_>,
-        file: &Path,
-        spp: u32,
-    ) -> Result<Self, Failure> {
+    fn find(args: &RenderArgs, picture: &Picture, keeper: &Keeper<'_>) -> Result<Self, Failure> {
         if args.restart {
             return Ok(Self::Samples(None));
         }
         let shard = args.shard.unwrap_or_default();
-        if until.is_some() {
+        if picture.until.is_some() {
             let resume = keeper.resume(shard)?;
             let most = args.picture.spp.unwrap_or(u32::MAX);
             return match resume.as_ref().map(Snapshot::spp) {
@@ -41,12 +59,15 @@ impl Earlier {
             };
         }
         let part = match args.shard {
-            Some(shard) => keeper.finished_part(file, shard)?,
+            Some(shard) => keeper.finished_part(&picture.file, shard)?,
             None => None,
         };
         let has_more =
             args.json.is_some() || args.stderr_image.is_some() || args.save_order.is_some();
-        if part.as_ref().is_some_and(|part| part.spp() == spp) && (args.resume || !has_more) {
+        let is_whole = part
+            .as_ref()
+            .is_some_and(|part| part.spp() == picture.spp());
+        if is_whole && (args.resume || !has_more) {
             return Ok(Self::Complete);
         }
         Ok(Self::Samples(keeper.resume(shard)?.or(part).map(Box::new)))
@@ -54,7 +75,7 @@ impl Earlier {
 }
 
 /// The state to go on from: a finished picture of fewer samples is extended. `None` if it cannot be.
-pub fn extended(found: Snapshot, world: &World, spp: u32) -> Option<Snapshot> {
+fn extended(found: Snapshot, world: &World, spp: u32) -> Option<Snapshot> {
     let fewer = found.spp();
     if fewer == spp {
         return Some(found);

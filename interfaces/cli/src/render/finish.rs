@@ -1,30 +1,36 @@
 //! Outputs of a rendering.
 
-use std::path::Path;
-
-use antumbra_render::{Options, World};
-use antumbra_scene::Scene;
+use antumbra_render::World;
 
 use super::checkpoint::Keeper;
 use super::document::{Document, summarise};
 use super::layers;
+use super::start::Picture;
 use super::until::Grown;
 use crate::args::{RenderArgs, usual};
 use crate::exit::Failure;
-use crate::{interrupt, json};
+use crate::{interrupt, json, scenes};
 
 /// Writes everything there is to write, during which no signal ends the program, and says how it went.
 pub fn complete(
     args: &RenderArgs,
-    of: (&Scene, &World, &Options),
+    of: (&Picture, &World),
     grown: &Grown,
-    document: &Document<'_>,
-    (file, keeper): (&Path, &Keeper<'_>),
+    resumed_tiles: Option<[usize; 2]>,
+    keeper: &Keeper<'_>,
 ) -> Result<(), Failure> {
+    let (picture, world) = of;
+    // Surfaces that light reaches send shadow rays. A warning about the file says enough.
+    let is_dark = grown.rendering.stats.shadow_rays == 0 && args.shard.is_none();
+    if is_dark && !picture.is_invisible {
+        let isa = picture.options.recipe.engine.isa();
+        scenes::warn_of_nothing(&picture.scene, world, isa);
+    }
+    let document = Document::new(args, of, grown, resumed_tiles);
     let _writing = interrupt::writing();
     keeper.finish();
     keeper.keep_finished(&grown.snapshot);
-    write(args, of, grown, document, (file, keeper))?;
+    write(args, of, grown, &document, keeper)?;
     let outcome = if grown.interrupted {
         Err(keeper.interrupted_after(&grown.snapshot))
     } else if args.keep_samples {
@@ -33,7 +39,7 @@ pub fn complete(
         keeper.discard()
     };
     if outcome.is_ok() || grown.interrupted {
-        summarise(document, &grown.rendering.stats.split);
+        summarise(&document, &grown.rendering.stats.split);
     }
     outcome
 }
@@ -41,21 +47,20 @@ pub fn complete(
 /// Writes all outputs. If that fails, the samples are kept.
 fn write(
     args: &RenderArgs,
-    (scene, world, options): (&Scene, &World, &Options),
+    (picture, world): (&Picture, &World),
     grown: &Grown,
     document: &Document<'_>,
-    (file, keeper): (&Path, &Keeper<'_>),
+    keeper: &Keeper<'_>,
 ) -> Result<(), Failure> {
     let (rendering, snapshot) = (&grown.rendering, &grown.snapshot);
     let written = match args.shard {
-        None if args.layers || args.metadata => {
-            layers::write(args, scene, world, rendering, options, file)
-        }
+        None if args.layers || args.metadata => layers::write(args, picture, world, rendering),
         None => {
-            let usual = usual(scene.integrator.is_light());
+            let usual = usual(picture.scene.integrator.is_light());
+            let file = &picture.file;
             args.display.write(&rendering.image, file, usual)
         }
-        Some(_) => keeper.write_part(file, snapshot),
+        Some(_) => keeper.write_part(&picture.file, snapshot),
     };
     let written = written.and_then(|()| {
         if let (Some(path), Some(image)) = (&args.stderr_image, &rendering.standard_error) {
@@ -64,16 +69,4 @@ fn write(
         json::write(document, args.json.as_ref())
     });
     written.map_err(|failure| keeper.rescue(snapshot, failure))
-}
-
-/// Bytes that the output may take: the size of an uncompressed image, or of the sums of a shard,
-/// whose tiles overlap a little.
-pub fn room(scene: &Scene, args: &RenderArgs) -> u64 {
-    let [x0, x1, y0, y1] = scene.film.pixel_bounds().map(u64::from);
-    let pixels = (x1 - x0) * (y1 - y0);
-    match args.shard {
-        None => 12 * pixels,
-        Some(shard) if args.stderr_image.is_some() => 104 * pixels / u64::from(shard.count()),
-        Some(shard) => 40 * pixels / u64::from(shard.count()),
-    }
 }

@@ -1,12 +1,11 @@
 //! Layers and notes of an EXR file.
 
-use std::path::Path;
-
 use antumbra_image::{Channel, Notes};
 use antumbra_render::{Layers, Options, Rendering, World};
 use antumbra_scene::{Projection, Scene};
 use glam::{DVec3, Vec3};
 
+use super::start::Picture;
 use crate::args::{AovNames, RenderArgs};
 use crate::exit::Failure;
 
@@ -16,19 +15,18 @@ const MOST_SAMPLES: u32 = 64;
 /// Writes a picture with its layers, if they are wanted, and with notes about it.
 pub fn write(
     args: &RenderArgs,
-    scene: &Scene,
+    picture: &Picture,
     world: &World,
     rendering: &Rendering,
-    options: &Options,
-    file: &Path,
 ) -> Result<(), Failure> {
+    let options = &picture.options;
     let channels = if args.layers {
         channels(args.aov_names, world, rendering, options)?
     } else {
         Vec::new()
     };
-    let notes = notes(scene, rendering, options);
-    Ok(rendering.image.write_layers(file, &channels, &notes)?)
+    let notes = notes(&picture.scene, rendering, options);
+    Ok((rendering.image).write_layers(&picture.file, &channels, &notes)?)
 }
 
 fn channels(

@@ -1,7 +1,7 @@
 //! How people look at a rendering while it lasts: the preview beside the image, and tev.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use antumbra_image::is_our_picture;
@@ -12,6 +12,7 @@ use antumbra_view::{Display, PreviewFile};
 use crate::args::{RenderArgs, usual};
 use crate::exit::{Failure, say, tell};
 use crate::output;
+use crate::progress::lock;
 
 /// Time between two previews.
 const EVERY: Duration = Duration::from_secs(3);
@@ -57,10 +58,13 @@ impl Looks {
 
     /// Shows the picture as it is, for the last time.
     pub fn finish(&self) {
-        if let Some(failure) = take(&self.preview).and_then(PreviewFile::finish) {
+        if let Some(failure) = lock(&self.preview).take().and_then(PreviewFile::finish) {
             say(format_args!("warning: no preview: {failure}"));
         }
-        if take(&self.display).is_some_and(|display| !display.finish()) {
+        if lock(&self.display)
+            .take()
+            .is_some_and(|display| !display.finish())
+        {
             tell(format_args!(
                 "note: the viewer of --display-server did not get all of the picture"
             ));
@@ -77,10 +81,6 @@ impl Looks {
             let _ = std::fs::remove_file(path);
         }
     }
-}
-
-fn take<T>(mutex: &Mutex<Option<T>>) -> Option<T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
 
 /// Where the preview of an output lies. Streams have none.

@@ -75,14 +75,13 @@ pub struct Grown {
     pub interrupted: bool,
 }
 
-/// Renders a task, or without its shard and training rays in steps until a limit is reached, from its samples on. Sets the samples per
-/// pixel of `options` to the number in the picture.
+/// Renders a task, or without its shard and training rays in steps until a limit is reached, from its samples on, with at most the
+/// samples per pixel of the options.
 ///
 /// An interruption of steps ends with the last finished step of this run, if there is one.
 pub fn render(
     world: &World,
-    options: &mut Options,
-    most: Option<u32>,
+    options: &Options,
     until: Option<Until>,
     monitor: &dyn Monitor,
     task: Task,
@@ -97,17 +96,20 @@ pub fn render(
             interrupted: false,
         });
     };
-    let most = most.unwrap_or(Sampler::MAX_SAMPLES);
+    let most = options.spp.unwrap_or(Sampler::MAX_SAMPLES);
     let start = Instant::now();
     let elapsed = || start.elapsed() + Duration::try_from_secs_f64(before).unwrap_or_default();
-    let mut step = |spp: u32, resume: Option<Snapshot>| {
-        options.spp = Some(spp);
+    let step = |spp: u32, resume: Option<Snapshot>| {
+        let options = Options {
+            spp: Some(spp),
+            ..options.clone()
+        };
         let task = Task {
             resume,
             extendable: true,
             ..Task::default()
         };
-        render_task(world, options, task, monitor)
+        render_task(world, &options, task, monitor)
     };
     let resume = task.resume;
     let mut spp = resume.as_ref().map_or(FIRST.min(most), Snapshot::spp);
@@ -137,7 +139,6 @@ pub fn render(
             Err(error) => return Err(error),
         }
     }
-    options.spp = Some(spp);
     Ok(grown)
 }
 
@@ -193,19 +194,13 @@ mod tests {
             time: Some(Duration::from_secs(1000)),
             noise: None,
         };
-        let mut options = Options {
+        let options = Options {
+            spp: Some(64),
             texture_spp: Some(TEXTURES),
             ..Options::default()
         };
         let count = Count::default();
-        let grown = render(
-            &world,
-            &mut options,
-            Some(64),
-            Some(until),
-            &count,
-            Task::default(),
-        );
+        let grown = render(&world, &options, Some(until), &count, Task::default());
         let grown = grown.expect("a picture");
         assert!(!grown.interrupted);
         assert_eq!(grown.snapshot.spp(), 64);
