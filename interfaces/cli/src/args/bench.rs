@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use antumbra_lab::bench::Options;
+use antumbra_trees::{BUILDERS, ORDERS};
 use clap::Args;
 
 use super::names::{self, help_list};
@@ -30,7 +31,7 @@ pub struct BenchArgs {
         value_name = "LIST",
         help_heading = heading::TREE,
         help = "Child orders, see `antumbra list`",
-        long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one. If absent: the choice of the preset.")
+        long_help = help_list("Child orders of shadow rays", &names::all(&ORDERS), "all is every one. If absent: the choice of the preset.")
     )]
     pub orders: Option<Orders>,
     #[command(flatten)]
@@ -71,7 +72,7 @@ pub struct BenchArgs {
         default_value = "all",
         help_heading = heading::WORK,
         help = "Builders to be timed",
-        long_help = help_list("Builders whose build times are measured, beside Embree's", &names::builders(),
+        long_help = help_list("Builders whose build times are measured, beside Embree's", &names::all(&BUILDERS),
             "all is every one.")
     )]
     pub builds: Trees,

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use antumbra_load::{Crop, FilterKind, LookAt, SamplerName, Sun, Up};
 use clap::Args;
 
-use super::names::one_of;
+use super::names::{named, one_of};
 use super::{heading, values};
 
 /// Flags about the camera: its place, and what part of its picture is wanted.
@@ -48,10 +48,10 @@ pub struct CameraArgs {
     /// Filter: box, triangle, gaussian, mitchell, sinc
     ///
     /// With the radius and the constants that pbrt-v3 has by default.
-    #[arg(long, value_name = "F", value_parser = one_of::<FilterKind>(filters()), hide_possible_values = true)]
+    #[arg(long, value_name = "F", value_parser = one_of::<FilterKind>(named(&FilterKind::ALL, FilterKind::name)), hide_possible_values = true)]
     pub filter: Option<FilterKind>,
     /// Sampler: 02sequence, sobol, halton, maxmindist, random
-    #[arg(long, value_name = "S", value_parser = one_of::<SamplerName>(samplers()), hide_possible_values = true)]
+    #[arg(long, value_name = "S", value_parser = one_of::<SamplerName>(named(&SamplerName::ALL, SamplerName::name)), hide_possible_values = true)]
     pub sampler: Option<SamplerName>,
     /// Image around a mesh: .exr, .hdr or none
     ///
@@ -85,12 +85,4 @@ impl PoseArgs {
             .into_iter()
             .find_map(|(flag, given)| given.then_some(flag))
     }
-}
-
-fn filters() -> Vec<String> {
-    FilterKind::ALL.map(|kind| kind.name().to_owned()).to_vec()
-}
-
-fn samplers() -> Vec<String> {
-    SamplerName::ALL.map(|name| name.name().to_owned()).to_vec()
 }

@@ -6,7 +6,7 @@ use antumbra_image::{Display, Image, Tonemap};
 use clap::{Args, ValueEnum};
 
 use super::heading;
-use super::names::one_of;
+use super::names::{named, one_of};
 use crate::exit::{Failure, tell};
 use crate::output;
 
@@ -29,15 +29,11 @@ pub struct DisplayArgs {
     /// agx, the default, lets bright colours fade to white. filmic is the curve of the ACES reference. none cuts off what
     /// is brighter than white, as pbrt does. none is the default where values are no light: for ambient occlusion, and
     /// for layers and PNG or JPEG files that are converted.
-    #[arg(long, value_name = "CURVE", value_parser = one_of::<Tonemap>(curves()), hide_possible_values = true)]
+    #[arg(long, value_name = "CURVE", value_parser = one_of::<Tonemap>(named(&Tonemap::ALL, Tonemap::name)), hide_possible_values = true)]
     pub tonemap: Option<Tonemap>,
     /// Bits per channel of a PNG: 8 or 16
     #[arg(long, value_name = "N", default_value = "8", value_parser = ["8", "16"], hide_possible_values = true)]
     pub bits: String,
-}
-
-fn curves() -> Vec<String> {
-    Tonemap::ALL.map(|curve| curve.name().to_owned()).to_vec()
 }
 
 impl DisplayArgs {

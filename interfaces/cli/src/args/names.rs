@@ -4,41 +4,30 @@ use std::error::Error;
 use std::str::FromStr;
 
 use antumbra::Width;
-use antumbra::recipe::{Level, Preset, UnknownName};
-use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS};
+use antumbra::recipe::{Level, UnknownName};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
 /// Stands for what suits the machine.
 pub const AUTO: &str = "auto";
 
-/// Names of all orders.
-pub fn orders() -> Vec<String> {
-    ORDERS.iter().map(ToString::to_string).collect()
+/// Names of rows, in the order of their list.
+pub fn all<T: ToString>(rows: &[T]) -> Vec<String> {
+    rows.iter().map(ToString::to_string).collect()
 }
 
-/// Names of all builders.
-pub fn builders() -> Vec<String> {
-    BUILDERS.iter().map(ToString::to_string).collect()
-}
-
-/// Names of all collapses.
-pub fn collapses() -> Vec<String> {
-    COLLAPSES.iter().map(ToString::to_string).collect()
-}
-
-/// Names of all presets.
-pub fn presets() -> Vec<String> {
-    Preset::ALL.iter().map(ToString::to_string).collect()
+/// Names of rows that are no texts themselves.
+pub fn named<T: Copy>(rows: &[T], name: impl Fn(T) -> &'static str) -> Vec<String> {
+    rows.iter().map(|row| name(*row).to_owned()).collect()
 }
 
 /// Names of all levels, and `auto`.
 pub fn levels() -> Vec<String> {
-    with_auto(Level::ALL.iter().map(ToString::to_string).collect())
+    with_auto(all(&Level::ALL))
 }
 
 /// Names of all widths, and `auto`.
 pub fn widths() -> Vec<String> {
-    with_auto(Width::ALL.iter().map(ToString::to_string).collect())
+    with_auto(all(&Width::ALL))
 }
 
 fn with_auto(names: Vec<String>) -> Vec<String> {

@@ -4,7 +4,7 @@ use antumbra_load::IntegratorKind;
 use clap::Args;
 
 use super::heading;
-use super::names::{help_one, one_of};
+use super::names::{help_one, named, one_of};
 use super::values::{self, Resolution};
 
 /// Flags that decide the picture.
@@ -21,10 +21,10 @@ pub struct PictureArgs {
         long,
         value_name = "I",
         help = "Integrator, by pbrt's name [default: the scene's]",
-        long_help = help_one("Integrator", &integrators(),
+        long_help = help_one("Integrator", &named(&IntegratorKind::ALL, IntegratorKind::name),
             "If the scene has the same one, its settings are kept; otherwise they are pbrt-v3's defaults. \
              ambientocclusion is 0 to 1 for a mesh, and 0 to pi for a .pbrt scene. If absent: the scene's."),
-        value_parser = one_of::<IntegratorKind>(integrators()), hide_possible_values = true)]
+        value_parser = one_of::<IntegratorKind>(named(&IntegratorKind::ALL, IntegratorKind::name)), hide_possible_values = true)]
     pub integrator: Option<IntegratorKind>,
     /// Shadow rays per camera ray, or samples per light
     ///
@@ -45,9 +45,4 @@ pub struct PictureArgs {
         default_value_t = 0
     )]
     pub seed: u64,
-}
-
-fn integrators() -> Vec<String> {
-    let names = IntegratorKind::ALL.iter().map(|kind| kind.name());
-    names.map(str::to_owned).collect()
 }

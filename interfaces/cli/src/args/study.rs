@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use antumbra_lab::RaysFrom;
 use antumbra_lab::study::LogSize;
+use antumbra_trees::{BUILDERS, ORDERS};
 use clap::Args;
 
 use super::names::{self, help_list, help_one};
@@ -47,7 +48,7 @@ pub struct StudyArgs {
         value_name = "LIST",
         help_heading = heading::TREE,
         help = "Child orders, see `antumbra list` [all]",
-        long_help = help_list("Child orders of shadow rays", &names::orders(), "all is every one, and the default but for preset paper, which has the six of the paper.")
+        long_help = help_list("Child orders of shadow rays", &names::all(&ORDERS), "all is every one, and the default but for preset paper, which has the six of the paper.")
     )]
     pub orders: Option<Orders>,
     #[arg(
@@ -56,7 +57,7 @@ pub struct StudyArgs {
         value_name = "LIST",
         help_heading = heading::TREE,
         help = "Builders of the binary tree, or all",
-        long_help = help_list("Builders of the binary tree", &names::builders(), &format!("all is every one. {BASE}"))
+        long_help = help_list("Builders of the binary tree", &names::all(&BUILDERS), &format!("all is every one. {BASE}"))
     )]
     pub trees: Option<Trees>,
     #[command(flatten)]
@@ -117,7 +118,7 @@ pub struct StudyArgs {
         value_parser = values::rays_from,
         help_heading = heading::LEARNING,
         help = "Training rays: camera, surfaces, both",
-        long_help = help_one("Training rays of replays", &values::rays_from_names(),
+        long_help = help_one("Training rays of replays", &names::named(&RaysFrom::ALL, RaysFrom::name),
             "camera: shadow rays of the camera; surfaces: synthetic rays; both, as renderings do.")
     )]
     pub rays_from: Option<RaysFrom>,

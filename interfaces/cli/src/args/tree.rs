@@ -4,6 +4,7 @@
 use antumbra::recipe::{Builder, Collapse, Order, Preset};
 use antumbra::{Isa, Recipe};
 use antumbra_scene::Scene;
+use antumbra_trees::{BUILDERS, COLLAPSES, ORDERS};
 use clap::Args;
 
 use super::heading;
@@ -19,10 +20,10 @@ pub struct TreeArgs {
     #[arg(
         long,
         value_name = "O",
-        value_parser = row(names::orders(), antumbra_trees::order),
+        value_parser = row(names::all(&ORDERS), antumbra_trees::order),
         hide_possible_values = true,
         help = "Child order, see `antumbra list orders`",
-        long_help = help_one("Child order of shadow rays", &names::orders(),
+        long_help = help_one("Child order of shadow rays", &names::all(&ORDERS),
             "If absent: the choice of the scene, or of the preset.")
     )]
     pub order: Option<Order>,
@@ -31,10 +32,10 @@ pub struct TreeArgs {
     #[arg(
         long,
         value_name = "C",
-        value_parser = row(names::collapses(), antumbra_trees::collapse),
+        value_parser = row(names::all(&COLLAPSES), antumbra_trees::collapse),
         hide_possible_values = true,
         help = "Collapse of the binary tree",
-        long_help = help_one("How the binary tree is made wide", &names::collapses(),
+        long_help = help_one("How the binary tree is made wide", &names::all(&COLLAPSES),
             "Collapses that learn are given surface rays and the scene's own shadow rays. If absent: the choice of the preset.")
     )]
     pub collapse: Option<Collapse>,
@@ -58,12 +59,12 @@ pub struct PresetArgs {
     #[arg(
         long,
         value_name = "P",
-        value_parser = one_of::<Preset>(names::presets()),
+        value_parser = one_of::<Preset>(names::all(&Preset::ALL)),
         hide_possible_values = true,
         default_value_t = Preset::default(),
         help_heading = heading::TREE,
         help = "Named recipe of the tree",
-        long_help = help_one("Builder, collapse and order by one name", &names::presets(),
+        long_help = help_one("Builder, collapse and order by one name", &names::all(&Preset::ALL),
             "Other flags choose one of the three apart.")
     )]
     pub preset: Preset,
@@ -75,11 +76,11 @@ pub struct BuilderArgs {
     #[arg(
         long,
         value_name = "B",
-        value_parser = row(names::builders(), antumbra_trees::builder),
+        value_parser = row(names::all(&BUILDERS), antumbra_trees::builder),
         hide_possible_values = true,
         help_heading = heading::TREE,
         help = "Builder of the binary tree",
-        long_help = help_one("Builder of the binary tree", &names::builders(),
+        long_help = help_one("Builder of the binary tree", &names::all(&BUILDERS),
             "Builders that are driven by rays are given the scene's own shadow rays, or surface rays where there are none. \
              If absent: the choice of the preset.")
     )]
@@ -95,7 +96,7 @@ pub struct CollapsesArgs {
         value_name = "LIST",
         help_heading = heading::TREE,
         help = "Collapses of the binary tree, or all",
-        long_help = help_list("How the binary tree is made wide", &names::collapses(),
+        long_help = help_list("How the binary tree is made wide", &names::all(&COLLAPSES),
             "all is every one. Collapses that learn are given the training rays and surface rays. If absent: the choice of the \
              preset.")
     )]

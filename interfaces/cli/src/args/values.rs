@@ -280,14 +280,6 @@ pub fn cost(text: &str) -> Result<f32, String> {
     }
 }
 
-/// Names of the origins of training rays.
-pub fn rays_from_names() -> Vec<String> {
-    RaysFrom::ALL
-        .iter()
-        .map(|from| from.name().to_owned())
-        .collect()
-}
-
 /// Parses the origin of training rays.
 pub fn rays_from(text: &str) -> Result<RaysFrom, String> {
     let mut all = RaysFrom::ALL.into_iter();
