@@ -12,7 +12,7 @@ use antumbra_image::{Image, Rgb8Image, Window, heatmap};
 use antumbra_lab::{Gain, collect_rays, gain, make_directory, write_json};
 use antumbra_load::MemorySize;
 use antumbra_map::{Panel, PanelLegend, Steps, Theme, panels};
-use antumbra_render::{KeptTree, Options, Sight, World, render, training_rays};
+use antumbra_render::{KeptTree, Options, Rendering, Sight, World, render, training_rays};
 use antumbra_scene::Scene;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -78,25 +78,13 @@ pub fn run(memory: MemorySize) -> Result<(), Failure> {
         spp: Some(SPP),
         ..Options::default()
     };
-    let samples = u64::from(width) * u64::from(height) * u64::from(SPP);
-    let progress = Progress::of_picture("in sunlight", samples);
-    let rendering = render(&world, &options, &progress)?;
-    progress.finish();
+    let rendering = rendered(&world, &options)?;
     interrupt::check()?;
 
-    // The paper's baseline: binned SAH, collapsed by area, in the order of the builder.
-    let plain = KeptTree::unlearned(&world, &Recipe::default());
-    let lesson = training_rays(&world, &plain, &options, &())?;
-    let tree = KeptTree::learned(&world, &options.recipe, &lesson)?;
+    let [plain, tree] = trees(&world, &options)?;
     let places = Places::seen(&world, &tree);
     let (points, normals) = (&places.points, &places.normals);
-    let (open, sky_seconds) = timed("by the sky", |progress| {
-        let options = AmbientOcclusion {
-            samples: SKY,
-            ..AmbientOcclusion::default()
-        };
-        ambient_occlusion(tree.bvh(), points, normals, &options, progress)
-    })?;
+    let (open, sky_seconds) = open_sky(&tree, &places)?;
     let suns = suns()?;
     let (hours, sun_seconds) = timed("by the sun", |progress| {
         let weights = vec![STEP; suns.len()];
@@ -108,14 +96,9 @@ pub fn run(memory: MemorySize) -> Result<(), Failure> {
 
     let _writing = interrupt::writing();
     make_directory(out)?;
-    let longest = suns.len() as f64 * STEP;
-    write_pictures(
-        out,
-        &rendering.image.to_srgb8(),
-        &places,
-        &open,
-        (&hours, longest),
-    )?;
+    let light = rendering.image.to_srgb8();
+    let hours = (&*hours, suns.len() as f64 * STEP);
+    write_pictures(out, &light, &places, &open, hours)?;
     let document = Document {
         schema: "antumbra.demonstration/1",
         machine: version::machine(options.recipe.engine.isa()),
@@ -153,6 +136,36 @@ fn summarise(document: &Document, places: usize) {
         rays * document.sun_rays as f64 / 1e6,
         document.sun_seconds,
     ));
+}
+
+/// The paper's baseline (binned SAH, collapsed by area, in the order of the builder), and a tree that has learned.
+fn trees(world: &World, options: &Options) -> Result<[KeptTree; 2], Failure> {
+    let plain = KeptTree::unlearned(world, &Recipe::default());
+    let lesson = training_rays(world, &plain, options, &())?;
+    let tree = KeptTree::learned(world, &options.recipe, &lesson)?;
+    Ok([plain, tree])
+}
+
+/// How much of the sky each place sees, and the seconds of the rays.
+fn open_sky(tree: &KeptTree, places: &Places) -> Result<(Vec<f32>, f64), Failure> {
+    let options = AmbientOcclusion {
+        samples: SKY,
+        ..AmbientOcclusion::default()
+    };
+    let (points, normals) = (&places.points, &places.normals);
+    timed("by the sky", |progress| {
+        ambient_occlusion(tree.bvh(), points, normals, &options, progress)
+    })
+}
+
+/// The path traced picture.
+fn rendered(world: &World, options: &Options) -> Result<Rendering, Failure> {
+    let pixels = RESOLUTION.map(u64::from);
+    let samples = pixels[0] * pixels[1] * u64::from(SPP);
+    let progress = Progress::of_picture("in sunlight", samples);
+    let rendering = render(world, options, &progress)?;
+    progress.finish();
+    Ok(rendering)
 }
 
 /// The city, and its tree.

@@ -4,10 +4,11 @@ use std::fmt;
 use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU8, Ordering};
-use std::sync::{Mutex, PoisonError};
 
 use crate::progress::line::{COLUMNS, Line, wrapped};
+use crate::progress::lock;
 
 /// Why the program stops, one variant per exit code. The text is complete: it is printed as it is.
 #[derive(Debug, thiserror::Error)]
@@ -208,7 +209,7 @@ pub fn say(text: fmt::Arguments<'_>) {
     if is_quiet() && text.starts_with("warning: ") {
         return;
     }
-    let mut drawn = DRAWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut drawn = lock(&DRAWN);
     let mut out = io::stderr().lock();
     erase(&mut drawn, &mut out);
     let _ = if is_terminal() {
@@ -234,7 +235,7 @@ pub fn detail(text: fmt::Arguments<'_>) {
 
 /// Draws a line about progress in place of the last one, or adds it to a log.
 pub fn draw(line: &Line) {
-    let mut drawn = DRAWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut drawn = lock(&DRAWN);
     let mut out = io::stderr().lock();
     // Work of which nothing is known yet says nothing.
     if line.doing.is_empty() && line.share.is_none() {
@@ -251,7 +252,7 @@ pub fn draw(line: &Line) {
 
 /// Takes the line about progress off the terminal.
 pub fn undraw() {
-    let mut drawn = DRAWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut drawn = lock(&DRAWN);
     erase(&mut drawn, &mut io::stderr().lock());
 }
 

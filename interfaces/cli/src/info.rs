@@ -6,6 +6,7 @@ use antumbra::recipe::Builder;
 use antumbra::{Isa, Width};
 use antumbra_lab::{Machine, count};
 use antumbra_load::{Extent, IntegratorKind, Loaded, MemorySize};
+use antumbra_render::World;
 use antumbra_scene::{Geometry, Light, Material, Projection, Scene};
 use serde::{Serialize, Serializer};
 
@@ -145,24 +146,7 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
     let world = scenes::world(scene, builder)?;
     let extent = Extent::of(scene);
     let isa = Isa::best();
-    let mut trees = Vec::new();
-    let (mut dropped, mut primitives) = (0, 0);
-    for width in Width::ALL {
-        let start = Instant::now();
-        let bvh = world.bvh(antumbra_trees::engine(isa, width));
-        let seconds = start.elapsed().as_secs_f64();
-        let report = bvh.report();
-        (dropped, primitives) = (report.dropped, report.primitives);
-        trees.push(TreeInfo {
-            width: width.lanes(),
-            nodes: report.nodes,
-            leaves: report.leaves,
-            depth: report.depth,
-            bytes: report.bytes,
-            build_seconds: world.tree_seconds() + seconds,
-        });
-    }
-    let to_world = scene.camera.world_from_camera;
+    let (trees, primitives) = trees(&world, isa);
     Ok(Document {
         schema: "antumbra.info/1",
         machine: version::machine(isa),
@@ -177,28 +161,15 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
         objects: scene.objects.len(),
         instances: scene.instances.len(),
         stored_triangles: scene.stored_triangle_count(),
-        primitives,
-        dropped_primitives: dropped,
+        primitives: primitives[0],
+        dropped_primitives: primitives[1],
         materials: Counts::new(&Material::families(), scene.materials.iter().map(family)),
         lights: lights(scene),
         bounds: extent.map(|Extent { low, high }| [low, high].map(|at| (at + scene.origin).into())),
         origin: scene.origin.into(),
         up: loaded.up.axis.to_string(),
         up_reason: loaded.up.reason,
-        camera: CameraInfo {
-            position: (to_world.w_axis.truncate().as_dvec3() + scene.origin).into(),
-            direction: to_world.z_axis.truncate().normalize_or_zero().into(),
-            projection: match scene.camera.projection {
-                Projection::Perspective => "perspective",
-                Projection::Orthographic => "orthographic",
-                Projection::Spherical => "spherical",
-                Projection::EqualArea => "equalarea",
-                Projection::Realistic => "realistic",
-            },
-            fov_degrees: (scene.camera.projection == Projection::Perspective)
-                .then_some(scene.camera.fov),
-            lens_radius: scene.camera.lens_radius,
-        },
+        camera: CameraInfo::new(scene),
         film: FilmInfo {
             resolution: scene.film.resolution,
             pixel_bounds: scene.film.pixel_bounds(),
@@ -218,6 +189,27 @@ fn describe(loaded: &Loaded, builder: Builder) -> Result<Document, Failure> {
         tree_seconds: world.tree_seconds(),
         trees,
     })
+}
+
+/// Trees of every width, and how many primitives they hold and have left out.
+fn trees(world: &World, isa: Isa) -> (Vec<TreeInfo>, [usize; 2]) {
+    let (mut trees, mut primitives) = (Vec::new(), [0, 0]);
+    for width in Width::ALL {
+        let start = Instant::now();
+        let bvh = world.bvh(antumbra_trees::engine(isa, width));
+        let seconds = start.elapsed().as_secs_f64();
+        let report = bvh.report();
+        primitives = [report.primitives, report.dropped];
+        trees.push(TreeInfo {
+            width: width.lanes(),
+            nodes: report.nodes,
+            leaves: report.leaves,
+            depth: report.depth,
+            bytes: report.bytes,
+            build_seconds: world.tree_seconds() + seconds,
+        });
+    }
+    (trees, primitives)
 }
 
 /// Family of a material; one with a bump map counts as what it is without.
@@ -268,6 +260,24 @@ fn lights(scene: &Scene) -> Counts {
 }
 
 impl CameraInfo {
+    fn new(scene: &Scene) -> Self {
+        let camera = &scene.camera;
+        let to_world = camera.world_from_camera;
+        Self {
+            position: (to_world.w_axis.truncate().as_dvec3() + scene.origin).into(),
+            direction: to_world.z_axis.truncate().normalize_or_zero().into(),
+            projection: match camera.projection {
+                Projection::Perspective => "perspective",
+                Projection::Orthographic => "orthographic",
+                Projection::Spherical => "spherical",
+                Projection::EqualArea => "equalarea",
+                Projection::Realistic => "realistic",
+            },
+            fov_degrees: (camera.projection == Projection::Perspective).then_some(camera.fov),
+            lens_radius: camera.lens_radius,
+        }
+    }
+
     fn view(&self) -> String {
         match self.fov_degrees {
             Some(fov) => format!("field of view {fov} degrees"),
@@ -276,16 +286,30 @@ impl CameraInfo {
     }
 }
 
+/// A line for each tree.
+fn table(trees: &[TreeInfo]) -> String {
+    let row = |tree: &TreeInfo| {
+        vec![
+            tree.width.to_string(),
+            count(tree.nodes as u64),
+            count(tree.leaves as u64),
+            tree.depth.to_string(),
+            format!("{:.1}", tree.bytes as f64 / 1e6),
+            format!("{:.3}", tree.build_seconds),
+        ]
+    };
+    let rows: Vec<_> = trees.iter().map(row).collect();
+    draw(
+        &["width", "nodes", "leaves", "depth", "MB", "build s"],
+        &rows,
+    )
+}
+
 fn text(document: &Document) -> String {
     let families = Material::families();
     let (usual, rare) = families.split_at(4);
-    let Document {
-        materials,
-        lights,
-        camera,
-        film,
-        ..
-    } = document;
+    let (materials, lights) = (&document.materials, &document.lights);
+    let (camera, film) = (&document.camera, &document.film);
     let ([width, height], [x0, x1, y0, y1]) = (film.resolution, film.pixel_bounds);
     let load = document.load.as_ref().map_or(String::new(), |load| {
         format!(
@@ -297,19 +321,7 @@ fn text(document: &Document) -> String {
         Some([low, high]) => format!("{low:?} to {high:?}"),
         None => "none".to_owned(),
     };
-    let row = |tree: &TreeInfo| {
-        vec![
-            tree.width.to_string(),
-            count(tree.nodes as u64),
-            count(tree.leaves as u64),
-            tree.depth.to_string(),
-            format!("{:.1}", tree.bytes as f64 / 1e6),
-            format!("{:.3}", tree.build_seconds),
-        ]
-    };
-    let rows: Vec<_> = document.trees.iter().map(row).collect();
-    let header = ["width", "nodes", "leaves", "depth", "MB", "build s"];
-    let trees = draw(&header, &rows);
+    let trees = table(&document.trees);
     format!(
         "{}\n\
          shapes       {} with {} triangles, {} spheres and {} curves; {} degenerate primitives left out\n\

@@ -1,7 +1,9 @@
 //! `antumbra merge`: parts of a picture become the picture.
 
+use std::path::PathBuf;
+
 use antumbra_load::MemorySize;
-use antumbra_render::{Snapshot, image_hash};
+use antumbra_render::{Identity, Snapshot, image_hash};
 use serde::Serialize;
 
 use crate::args::{MergeArgs, usual};
@@ -33,22 +35,7 @@ pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
     ])?;
     files.reads_some(args.parts.iter().map(|part| ("the part", Some(&**part))))?;
     files.check()?;
-    let mut parts = Vec::with_capacity(args.parts.len());
-    for path in &args.parts {
-        let Some(bytes) = archive::read(path)? else {
-            return Err(Failure::Usage(format!("there is no {}", path.display())));
-        };
-        let (identity, snapshot) =
-            Snapshot::from_bytes(&bytes).map_err(|error| Failure::refused(path, &error))?;
-        parts.push((text(path), identity, snapshot));
-        interrupt::check()?;
-    }
-    let number = parts.len();
-    let Some((_, identity, _)) = parts.first() else {
-        return Err(Failure::Usage("there are no parts".into()));
-    };
-    let identity = identity.clone();
-    let whole = Snapshot::join(parts).map_err(|error| Failure::Usage(error.to_string()))?;
+    let (identity, whole) = joined(&args.parts)?;
     let image = whole.image()?;
     let errors = whole.standard_error()?;
     if args.stderr_image.is_some() && errors.is_none() {
@@ -80,13 +67,36 @@ pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
     };
     json::write(&document, args.json.as_ref())?;
     tell(format_args!(
-        "joined {number} parts of {}, rendered in {:.2} s in all; wrote {}",
-        document.scene, document.render_seconds, document.output
+        "joined {} parts of {}, rendered in {:.2} s in all; wrote {}",
+        args.parts.len(),
+        document.scene,
+        document.render_seconds,
+        document.output
     ));
     if let Some(path) = &document.stderr_image {
         tell(format_args!("wrote {path}"));
     }
     Ok(())
+}
+
+/// What the parts have in common, and all of their samples.
+fn joined(paths: &[PathBuf]) -> Result<(Identity, Snapshot), Failure> {
+    let mut parts = Vec::with_capacity(paths.len());
+    for path in paths {
+        let Some(bytes) = archive::read(path)? else {
+            return Err(Failure::Usage(format!("there is no {}", path.display())));
+        };
+        let (identity, snapshot) =
+            Snapshot::from_bytes(&bytes).map_err(|error| Failure::refused(path, &error))?;
+        parts.push((text(path), identity, snapshot));
+        interrupt::check()?;
+    }
+    let Some((_, identity, _)) = parts.first() else {
+        return Err(Failure::Usage("there are no parts".into()));
+    };
+    let identity = identity.clone();
+    let whole = Snapshot::join(parts).map_err(|error| Failure::Usage(error.to_string()))?;
+    Ok((identity, whole))
 }
 
 /// The JSON document.

@@ -238,6 +238,13 @@ fn report(
     if let Some(learned) = &learned {
         tell(format_args!("{learned}"));
     }
+    tell_values(target, without_value, mean.zip(min.zip(max)));
+    bake.end("rays", rays, done);
+    Ok(())
+}
+
+/// Says how much is open: on average, at least and at most.
+fn tell_values(target: &Target, without_value: usize, found: Option<(f64, (f32, f32))>) {
     if without_value > 0 {
         tell(format_args!(
             "{} {} without a normal have the value NaN",
@@ -245,13 +252,11 @@ fn report(
             target.name(),
         ));
     }
-    if let (Some(mean), Some(min), Some(max)) = (mean, min, max) {
+    if let Some((mean, (min, max))) = found {
         tell(format_args!(
             "ambient occlusion {mean:.3} on average, {min:.3} to {max:.3}"
         ));
     }
-    bake.end("rays", rays, done);
-    Ok(())
 }
 
 /// Texels that triangles cover.

@@ -102,6 +102,12 @@ impl<'a> Asked<'a> {
             crs.name(),
             site.north.abs()
         ));
+        self.settle_north(name, crs, &site);
+        Ok(Some(site))
+    }
+
+    /// Grid north follows from the place, unless it is given.
+    fn settle_north(&self, name: &str, crs: &Crs, site: &Site) {
         if let Some(north) = self.north {
             let asked = north.settle(site.north);
             let apart = (asked - site.north + 180.0).rem_euclid(360.0) - 180.0;
@@ -113,6 +119,5 @@ impl<'a> Asked<'a> {
                 ));
             }
         }
-        Ok(Some(site))
     }
 }

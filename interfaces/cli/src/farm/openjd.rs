@@ -70,6 +70,43 @@ fn check_texts(plan: &Plan) -> Result<(), Failure> {
     }
 }
 
+/// Definitions of the parameters, and the references to the outputs.
+fn parameters(plan: &Plan, built_in: bool, directory: &Path) -> (Vec<Value>, Vec<String>) {
+    let path = |name: &str, object: &str, flow: &str, default: &str| {
+        let mut path = json!({
+            "name": name, "type": "PATH", "objectType": object, "dataFlow": flow,
+        });
+        if let Ok(inside) = Path::new(default).strip_prefix(directory) {
+            path["default"] = json!(inside);
+        }
+        path
+    };
+    let output = |name: &str, file: &str| path(name, "FILE", "OUT", file);
+    let scene = if built_in {
+        json!({ "name": "Scene", "type": "STRING", "default": plan.scene })
+    } else {
+        path("Scene", "FILE", "IN", &plan.scene)
+    };
+    let mut parameters = vec![
+        json!({ "name": "Program", "type": "STRING", "default": plan.program }),
+        scene,
+        output("Output", &plan.output),
+        path("Folder", "DIRECTORY", "INOUT", &plan.folder),
+    ];
+    let more = [("StderrImage", &plan.stderr_image), ("Lines", &plan.lines)];
+    let more = more
+        .into_iter()
+        .filter_map(|(name, file)| Some(output(name, file.as_ref()?)));
+    parameters.extend(more);
+    let mut outputs = vec!["{{Param.Output}}".to_owned()];
+    for (index, file) in plan.more_outputs.iter().enumerate() {
+        let name = format!("Output{}", index + 2);
+        parameters.push(output(&name, file));
+        outputs.push(format!("{{{{Param.{name}}}}}"));
+    }
+    (parameters, outputs)
+}
+
 /// The template, to lie in a directory: paths inside of it are there by default, others must be given to whoever
 /// runs the job.
 fn template(plan: &Plan, built_in: bool, directory: &Path) -> Value {
@@ -86,40 +123,9 @@ fn template(plan: &Plan, built_in: bool, directory: &Path) -> Value {
             } }
         })
     };
-    let path = |name: &str, object: &str, flow: &str, default: &str| {
-        let mut path = json!({
-            "name": name, "type": "PATH", "objectType": object, "dataFlow": flow,
-        });
-        if let Ok(inside) = Path::new(default).strip_prefix(directory) {
-            path["default"] = json!(inside);
-        }
-        path
-    };
-    let scene = if built_in {
-        json!({ "name": "Scene", "type": "STRING", "default": plan.scene })
-    } else {
-        path("Scene", "FILE", "IN", &plan.scene)
-    };
-    let mut parameters = vec![
-        json!({ "name": "Program", "type": "STRING", "default": plan.program }),
-        scene,
-        path("Output", "FILE", "OUT", &plan.output),
-        path("Folder", "DIRECTORY", "INOUT", &plan.folder),
-    ];
-    let errors = plan.stderr_image.as_ref().map(|image| {
-        parameters.push(path("StderrImage", "FILE", "OUT", image));
-        "{{Param.StderrImage}}"
-    });
-    let lines = plan.lines.as_ref().map(|file| {
-        parameters.push(path("Lines", "FILE", "OUT", file));
-        "{{Param.Lines}}"
-    });
-    let mut outputs = vec!["{{Param.Output}}".to_owned()];
-    for (index, output) in plan.more_outputs.iter().enumerate() {
-        let name = format!("Output{}", index + 2);
-        parameters.push(path(&name, "FILE", "OUT", output));
-        outputs.push(format!("{{{{Param.{name}}}}}"));
-    }
+    let (parameters, outputs) = parameters(plan, built_in, directory);
+    let errors = plan.stderr_image.as_ref().map(|_| "{{Param.StderrImage}}");
+    let lines = plan.lines.as_ref().map(|_| "{{Param.Lines}}");
     let (step, description) = match plan.is_bake() {
         true => ("Compute", "Computes shards of a job and merges them."),
         false => ("Render", "Renders shards of a picture and merges them."),

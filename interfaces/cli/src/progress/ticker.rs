@@ -1,11 +1,12 @@
 //! A thread that says how far the work is: on a terminal in a line that is drawn again, elsewhere in a line every half
 //! minute. Silent with `-q`.
 
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Condvar, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use super::line::Line;
+use super::lock;
 use crate::exit;
 
 /// Time between two drawings.
@@ -78,8 +79,4 @@ impl Drop for Ticker {
     fn drop(&mut self) {
         self.stop();
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
