@@ -130,6 +130,15 @@ fn compare(bench: &mut Bench, program: &'static str, runs: [&dyn Fn(&mut Timed) 
     }
 }
 
+/// A program with every crate, in the order of [`CRATES`].
+macro_rules! with_each {
+    ($program:ident($($argument:expr),*)) => {[
+        &|timed: &mut Timed| with_antumbra::$program($($argument,)* timed),
+        &|timed: &mut Timed| with_obvhs::$program($($argument,)* timed),
+        &|timed: &mut Timed| with_bvh::$program($($argument,)* timed),
+    ]};
+}
+
 /// The three programs.
 fn programs(bench: &mut Bench) {
     let size = |whole: usize| whole / bench.part;
@@ -139,32 +148,12 @@ fn programs(bench: &mut Bench) {
     let torus = input::torus(48, 24);
     let places = input::places(size(10_000));
     let camera = input::camera(size(1000));
-    compare(
-        bench,
-        "baker",
-        [
-            &|timed| with_antumbra::bake(&city, &baking, timed),
-            &|timed| with_obvhs::bake(&city, &baking, timed),
-            &|timed| with_bvh::bake(&city, &baking, timed),
-        ],
-    );
-    compare(
-        bench,
-        "visibility",
-        [
-            &|timed| with_antumbra::see(&city, &points, timed),
-            &|timed| with_obvhs::see(&city, &points, timed),
-            &|timed| with_bvh::see(&city, &points, timed),
-        ],
-    );
+    compare(bench, "baker", with_each!(bake(&city, &baking)));
+    compare(bench, "visibility", with_each!(see(&city, &points)));
     compare(
         bench,
         "instances",
-        [
-            &|timed| with_antumbra::shade(&torus, &places, &camera, timed),
-            &|timed| with_obvhs::shade(&torus, &places, &camera, timed),
-            &|timed| with_bvh::shade(&torus, &places, &camera, timed),
-        ],
+        with_each!(shade(&torus, &places, &camera)),
     );
 }
 
