@@ -98,7 +98,7 @@ impl Closest {
         index: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, Self>> {
         let (py, hits) = (slf.py(), slf.as_super().get());
-        let chosen = hits.of(py, &hits.chosen(py, index)?)?;
+        let chosen = hits.of(&hits.chosen(py, index)?)?;
         Bound::new(py, PyClassInitializer::from(chosen).add_subclass(Self))
     }
 

@@ -55,7 +55,7 @@ impl HitList {
     fn ray<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyArrayDyn<i64>>> {
         let py = slf.py();
         let splits = slf.get().splits.bind(py).try_readonly().map_err(wrong)?;
-        let hits = slf.as_super().get().arrays.t.bind(py).len();
+        let hits = slf.as_super().get().t.bind(py).len();
         let mut rays = memory::room(hits, "rays of hits")?;
         for (ray, ends) in splits.as_slice()?.windows(2).enumerate() {
             rays.extend((ends[0]..ends[1]).map(|_| ray as i64));
@@ -86,7 +86,7 @@ impl HitList {
         ];
         let hits = slf.as_super().get();
         let places = PySlice::new(py, ends[0] as isize, ends[1] as isize, 1);
-        hits.of(py, &hits.chosen(py, &places)?)
+        hits.of(&hits.chosen(py, &places)?)
     }
 
     /// A table of all hits, such as ``pandas.DataFrame`` takes: one row for each hit.
@@ -131,7 +131,7 @@ impl HitList {
     fn _repr_html_(slf: &Bound<'_, Self>) -> PyResult<String> {
         let py = slf.py();
         let rays = (slf.get().splits.bind(py).len() - 1).to_string();
-        let hits = slf.as_super().get().arrays.t.bind(py).len().to_string();
+        let hits = slf.as_super().get().t.bind(py).len().to_string();
         Ok(html::table(
             "antumbra.HitList",
             &[("rays", rays), ("hits", hits)],
@@ -156,13 +156,13 @@ impl HitList {
     ) -> Reduced<'py, (Bound<'py, PyArrayDyn<i64>>, State<'py>)> {
         let (py, list) = (slf.py(), slf.get());
         let restore = slf.get_type().getattr("_restore_list")?;
-        let state = slf.as_super().get().arrays.state(py);
+        let state = slf.as_super().get().state(py);
         Ok((restore, (list.splits.bind(py).clone(), state)))
     }
 
     fn __repr__(slf: &Bound<'_, Self>) -> String {
         let (py, rays) = (slf.py(), slf.get().splits.bind(slf.py()).len() - 1);
-        let hits = slf.as_super().get().arrays.t.bind(py).len();
+        let hits = slf.as_super().get().t.bind(py).len();
         format!("<antumbra.HitList: {hits} hits of {rays} rays>")
     }
 }

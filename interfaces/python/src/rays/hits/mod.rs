@@ -30,17 +30,6 @@ use crate::scene::saved::Reduced;
 /// Hits whose points or normals a thread computes at a time. Fewer stay on the calling thread.
 const SOME: usize = 1 << 13;
 
-/// Arrays of hits, in a shape.
-struct Arrays {
-    t: Py<PyArrayDyn<f32>>,
-    triangle: Py<PyArrayDyn<i32>>,
-    mesh: Py<PyArrayDyn<i32>>,
-    instance: Py<PyArrayDyn<i32>>,
-    uv: Py<PyArrayDyn<f32>>,
-    point: PyOnceLock<Py<PyArrayDyn<f64>>>,
-    normal: PyOnceLock<Py<PyArrayDyn<f32>>>,
-}
-
 /// One hit of the arrays, and its place in them.
 #[derive(Clone, Copy)]
 struct At {
@@ -50,10 +39,59 @@ struct At {
     place: usize,
 }
 
-impl Arrays {
-    fn new(py: Python<'_>, columns: Columns, shape: &[usize]) -> PyResult<Self> {
-        let mut of_uv = shape.to_vec();
-        of_uv.push(2);
+fn gone() -> PyErr {
+    pyo3::exceptions::PyRuntimeError::new_err(
+        "hits that were pickled have no scene: point and normal go along if they were used before",
+    )
+}
+
+/// First hits of rays. Arrays have the shape of the rays.
+///
+/// Where a ray hits nothing, ``t`` is inf, ids are -1, ``uv`` is 0, and ``point`` and ``normal`` are NaN.
+///
+/// An index chooses hits as in an array of numpy, and makes a copy of them: ``hits[3]``, ``hits[2:5]``, ``hits[hits.hit]``,
+/// ``hits[[0, 7]]``. ``len(hits)`` is the length of the first axis.
+///
+/// Examples
+/// --------
+/// >>> import antumbra as am
+/// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+/// >>> hits = scene.intersect([[0.2, 0.2, 0], [2, 2, 0]], [0, 0, 1])
+/// >>> len(hits), hits.hit
+/// (2, array([ True, False]))
+/// >>> hits[hits.hit].point
+/// array([[0.2, 0.2, 1. ]])
+#[pyclass(frozen, subclass, weakref, module = "antumbra")]
+pub struct Hits {
+    /// Distance in lengths of the direction: float32.
+    #[pyo3(get)]
+    t: Py<PyArrayDyn<f32>>,
+    /// Place of the triangle in the faces of its mesh, or of the segment in its curves: int32.
+    #[pyo3(get)]
+    triangle: Py<PyArrayDyn<i32>>,
+    /// Place of the mesh in the list of meshes: int32.
+    #[pyo3(get)]
+    mesh: Py<PyArrayDyn<i32>>,
+    /// Place of the instance in the list of instances, -1 for meshes in the world itself: int32.
+    #[pyo3(get)]
+    instance: Py<PyArrayDyn<i32>>,
+    /// Weights of the second and third corner of the triangle: float32 of shape (..., 2). On a curve, the share of the
+    /// segment's length, and the place across the curve from 0 to 1.
+    #[pyo3(get)]
+    uv: Py<PyArrayDyn<f32>>,
+    point: PyOnceLock<Py<PyArrayDyn<f64>>>,
+    normal: PyOnceLock<Py<PyArrayDyn<f32>>>,
+    source: Option<Source>,
+}
+
+impl Hits {
+    pub fn new(
+        py: Python<'_>,
+        columns: Columns,
+        shape: &[usize],
+        source: Source,
+    ) -> PyResult<Self> {
+        let of_uv = [shape, &[2]].concat();
         Ok(Self {
             t: shaped(py, columns.t, shape)?.unbind(),
             triangle: shaped(py, columns.triangle, shape)?.unbind(),
@@ -62,10 +100,111 @@ impl Arrays {
             uv: shaped(py, columns.uv, &of_uv)?.unbind(),
             point: PyOnceLock::new(),
             normal: PyOnceLock::new(),
+            source: Some(source),
         })
     }
 
-    fn shape(&self, py: Python<'_>) -> Vec<usize> {
+    /// The hits with points that are known already.
+    pub fn with_points(self, py: Python<'_>, points: Vec<f64>) -> PyResult<Self> {
+        let points = shaped(py, points, &self.shape_of_vectors(py))?;
+        // Nobody has read them yet.
+        let _ = self.point.set(py, points.unbind());
+        Ok(self)
+    }
+
+    /// Hits at these places in C order, an array of any shape.
+    pub fn of(&self, places: &Bound<'_, PyAny>) -> PyResult<Self> {
+        let source = match &self.source {
+            None => None,
+            Some(source) => {
+                // Only hits with rays of their own have to know which they are.
+                let chosen: Vec<usize> = match source.rays.is_empty() {
+                    true => Vec::new(),
+                    false => places.call_method1("reshape", (-1,))?.extract()?,
+                };
+                Some(source.of(&chosen)?)
+            }
+        };
+        Ok(Self::of_state(self.taken(places)?, source))
+    }
+
+    /// Places in C order of the hits that an index chooses, in the shape that numpy gives them.
+    pub fn chosen<'py>(
+        &self,
+        py: Python<'py>,
+        index: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let shape = self.lengths(py);
+        let count: usize = shape.iter().product();
+        let numpy = py.import("numpy")?;
+        let all = numpy.call_method1("arange", (count,))?;
+        let all = all.call_method1("reshape", (shape,))?;
+        numpy.call_method1("asarray", (all.get_item(index)?,))
+    }
+
+    /// Columns of a table, one row for each hit.
+    pub fn columns<'py>(
+        &self,
+        py: Python<'py>,
+        names: (&str, bool, bool),
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (distance, point, normal) = names;
+        let columns = PyDict::new(py);
+        let flat = |array: &Bound<'py, PyAny>| array.call_method1("reshape", (-1,));
+        columns.set_item(distance, flat(self.t.bind(py))?)?;
+        columns.set_item("triangle", flat(self.triangle.bind(py))?)?;
+        columns.set_item("mesh", flat(self.mesh.bind(py))?)?;
+        columns.set_item("instance", flat(self.instance.bind(py))?)?;
+        let mut vectors = vec![(self.uv.bind(py).as_any().clone(), &["u", "v"][..])];
+        if point {
+            vectors.push((self.point(py)?.into_any(), &["x", "y", "z"]));
+        }
+        if normal {
+            vectors.push((self.normal(py)?.into_any(), &["nx", "ny", "nz"]));
+        }
+        for (array, names) in vectors {
+            let rows = array.call_method1("reshape", (-1, names.len()))?;
+            for (axis, name) in names.iter().enumerate() {
+                let column = rows.get_item((PySlice::full(py), axis))?;
+                columns.set_item(name, column)?;
+            }
+        }
+        Ok(columns)
+    }
+
+    /// Number of hits, and of rays.
+    pub fn counts(&self, py: Python<'_>) -> PyResult<(usize, usize)> {
+        let hits = self.hit(py)?.call_method0("sum")?.extract()?;
+        Ok((hits, self.lengths(py).iter().product()))
+    }
+
+    /// What notebooks show.
+    pub fn html(&self, py: Python<'_>, name: &str, asked: &str) -> PyResult<String> {
+        let (hits, all) = self.counts(py)?;
+        let share = html::percent(hits as f64 / all as f64);
+        let shape = shape_text(&self.lengths(py));
+        let hits = format!("{hits} of {all} {asked} ({share})");
+        Ok(html::table(name, &[("shape", shape), ("hit", hits)]))
+    }
+
+    pub fn restore(state: State<'_>) -> Self {
+        Self::of_state(state, None)
+    }
+}
+
+/// Columns, and then point and normal where they are known.
+pub type State<'py> = (
+    Bound<'py, PyArrayDyn<f32>>,
+    Bound<'py, PyArrayDyn<i32>>,
+    Bound<'py, PyArrayDyn<i32>>,
+    Bound<'py, PyArrayDyn<i32>>,
+    Bound<'py, PyArrayDyn<f32>>,
+    Option<Bound<'py, PyArrayDyn<f64>>>,
+    Option<Bound<'py, PyArrayDyn<f32>>>,
+);
+
+impl Hits {
+    fn lengths(&self, py: Python<'_>) -> Vec<usize> {
         self.t.bind(py).shape().to_vec()
     }
 
@@ -117,43 +256,16 @@ impl Arrays {
         })
     }
 
-    /// Points of hits, computed once.
-    fn point<'py>(
-        &self,
-        py: Python<'py>,
-        source: Option<&Source>,
-    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let of = |source: &Source, meshes: &Meshes<'_>, hit: At| {
-            meshes
-                .point(hit.ids, hit.uv)
-                .or_else(|| source.point_on_ray(hit.t, hit.place))
-        };
-        self.vectors(py, &self.point, source, f64::NAN, of)
-    }
-
-    /// Normals of hits, computed once.
-    fn normal<'py>(
-        &self,
-        py: Python<'py>,
-        source: Option<&Source>,
-    ) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
-        let of = |source: &Source, meshes: &Meshes<'_>, hit: At| {
-            meshes.normal(hit.ids).or_else(|| source.normal_on_ray(hit))
-        };
-        self.vectors(py, &self.normal, source, f32::NAN, of)
-    }
-
     /// Vectors of hits, `nothing` for misses, computed once.
     fn vectors<'py, T: Element + Copy + Sync>(
         &self,
         py: Python<'py>,
         known: &PyOnceLock<Py<PyArrayDyn<T>>>,
-        source: Option<&Source>,
         nothing: T,
         of: impl Fn(&Source, &Meshes<'_>, At) -> Option<[T; 3]> + Sync + Send,
     ) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
         let made = known.get_or_try_init(py, || {
-            let source = source.ok_or_else(gone)?;
+            let source = self.source.as_ref().ok_or_else(gone)?;
             let meshes = Meshes::of(&source.parts);
             let vectors = self.each(py, [nothing; 3], |hit| {
                 (hit.ids.triangle >= 0).then(|| of(source, &meshes, hit))?
@@ -165,160 +277,14 @@ impl Arrays {
     }
 
     fn shape_of_vectors(&self, py: Python<'_>) -> Vec<usize> {
-        let mut shape = self.shape(py);
+        let mut shape = self.lengths(py);
         shape.push(3);
         shape
     }
-}
 
-fn gone() -> PyErr {
-    pyo3::exceptions::PyRuntimeError::new_err(
-        "hits that were pickled have no scene: point and normal go along if they were used before",
-    )
-}
-
-/// First hits of rays. Arrays have the shape of the rays.
-///
-/// Where a ray hits nothing, ``t`` is inf, ids are -1, ``uv`` is 0, and ``point`` and ``normal`` are NaN.
-///
-/// An index chooses hits as in an array of numpy, and makes a copy of them: ``hits[3]``, ``hits[2:5]``, ``hits[hits.hit]``,
-/// ``hits[[0, 7]]``. ``len(hits)`` is the length of the first axis.
-///
-/// Examples
-/// --------
-/// >>> import antumbra as am
-/// >>> scene = am.Scene([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
-/// >>> hits = scene.intersect([[0.2, 0.2, 0], [2, 2, 0]], [0, 0, 1])
-/// >>> len(hits), hits.hit
-/// (2, array([ True, False]))
-/// >>> hits[hits.hit].point
-/// array([[0.2, 0.2, 1. ]])
-#[pyclass(frozen, subclass, weakref, module = "antumbra")]
-pub struct Hits {
-    arrays: Arrays,
-    source: Option<Source>,
-}
-
-impl Hits {
-    pub fn new(
-        py: Python<'_>,
-        columns: Columns,
-        shape: &[usize],
-        source: Source,
-    ) -> PyResult<Self> {
-        Ok(Self {
-            arrays: Arrays::new(py, columns, shape)?,
-            source: Some(source),
-        })
-    }
-
-    /// The hits with points that are known already.
-    pub fn with_points(self, py: Python<'_>, points: Vec<f64>) -> PyResult<Self> {
-        let points = shaped(py, points, &self.arrays.shape_of_vectors(py))?;
-        // Nobody has read them yet.
-        let _ = self.arrays.point.set(py, points.unbind());
-        Ok(self)
-    }
-
-    /// Hits at these places in C order, an array of any shape.
-    pub fn of<'py>(&self, py: Python<'py>, places: &Bound<'py, PyAny>) -> PyResult<Self> {
-        let arrays = Arrays::of_state(self.arrays.of(py, places)?);
-        let source = match &self.source {
-            None => None,
-            Some(source) => {
-                // Only hits with rays of their own have to know which they are.
-                let chosen: Vec<usize> = match source.rays.is_empty() {
-                    true => Vec::new(),
-                    false => places.call_method1("reshape", (-1,))?.extract()?,
-                };
-                Some(source.of(&chosen)?)
-            }
-        };
-        Ok(Self { arrays, source })
-    }
-
-    /// Places in C order of the hits that an index chooses, in the shape that numpy gives them.
-    pub fn chosen<'py>(
-        &self,
-        py: Python<'py>,
-        index: &Bound<'py, PyAny>,
-    ) -> PyResult<Bound<'py, PyAny>> {
-        let shape = self.arrays.shape(py);
-        let count: usize = shape.iter().product();
-        let numpy = py.import("numpy")?;
-        let all = numpy.call_method1("arange", (count,))?;
-        let all = all.call_method1("reshape", (shape,))?;
-        numpy.call_method1("asarray", (all.get_item(index)?,))
-    }
-
-    /// Columns of a table, one row for each hit.
-    pub fn columns<'py>(
-        &self,
-        py: Python<'py>,
-        names: (&str, bool, bool),
-    ) -> PyResult<Bound<'py, PyDict>> {
-        let (distance, point, normal) = names;
-        let arrays = &self.arrays;
-        let columns = PyDict::new(py);
-        let flat = |array: &Bound<'py, PyAny>| array.call_method1("reshape", (-1,));
-        columns.set_item(distance, flat(arrays.t.bind(py))?)?;
-        columns.set_item("triangle", flat(arrays.triangle.bind(py))?)?;
-        columns.set_item("mesh", flat(arrays.mesh.bind(py))?)?;
-        columns.set_item("instance", flat(arrays.instance.bind(py))?)?;
-        let mut vectors = vec![(arrays.uv.bind(py).as_any().clone(), &["u", "v"][..])];
-        if point {
-            vectors.push((self.point(py)?.into_any(), &["x", "y", "z"]));
-        }
-        if normal {
-            vectors.push((self.normal(py)?.into_any(), &["nx", "ny", "nz"]));
-        }
-        for (array, names) in vectors {
-            let rows = array.call_method1("reshape", (-1, names.len()))?;
-            for (axis, name) in names.iter().enumerate() {
-                let column = rows.get_item((PySlice::full(py), axis))?;
-                columns.set_item(name, column)?;
-            }
-        }
-        Ok(columns)
-    }
-
-    /// Number of hits, and of rays.
-    pub fn counts(&self, py: Python<'_>) -> PyResult<(usize, usize)> {
-        let hits = self.hit(py)?.call_method0("sum")?.extract()?;
-        Ok((hits, self.arrays.shape(py).iter().product()))
-    }
-
-    /// What notebooks show.
-    pub fn html(&self, py: Python<'_>, name: &str, asked: &str) -> PyResult<String> {
-        let (hits, all) = self.counts(py)?;
-        let share = html::percent(hits as f64 / all as f64);
-        let shape = shape_text(&self.arrays.shape(py));
-        let hits = format!("{hits} of {all} {asked} ({share})");
-        Ok(html::table(name, &[("shape", shape), ("hit", hits)]))
-    }
-
-    pub fn restore(state: State<'_>) -> Self {
-        Self {
-            arrays: Arrays::of_state(state),
-            source: None,
-        }
-    }
-}
-
-/// Columns, and then point and normal where they are known.
-pub type State<'py> = (
-    Bound<'py, PyArrayDyn<f32>>,
-    Bound<'py, PyArrayDyn<i32>>,
-    Bound<'py, PyArrayDyn<i32>>,
-    Bound<'py, PyArrayDyn<i32>>,
-    Bound<'py, PyArrayDyn<f32>>,
-    Option<Bound<'py, PyArrayDyn<f64>>>,
-    Option<Bound<'py, PyArrayDyn<f32>>>,
-);
-
-impl Arrays {
     /// Some of the hits, given by their places in C order in an array of any shape.
-    fn of<'py>(&self, py: Python<'py>, places: &Bound<'py, PyAny>) -> PyResult<State<'py>> {
+    fn taken<'py>(&self, places: &Bound<'py, PyAny>) -> PyResult<State<'py>> {
+        let py = places.py();
         fn of<'py, T: Element>(
             array: &Py<PyArrayDyn<T>>,
             places: &Bound<'py, PyAny>,
@@ -359,10 +325,10 @@ impl Arrays {
         )
     }
 
-    fn of_state(state: State<'_>) -> Self {
+    fn of_state(state: State<'_>, source: Option<Source>) -> Self {
         let (t, triangle, mesh, instance, uv, point, normal) = state;
         let py = t.py();
-        let arrays = Self {
+        let hits = Self {
             t: t.unbind(),
             triangle: triangle.unbind(),
             mesh: mesh.unbind(),
@@ -370,68 +336,45 @@ impl Arrays {
             uv: uv.unbind(),
             point: PyOnceLock::new(),
             normal: PyOnceLock::new(),
+            source,
         };
         if let Some(point) = point {
-            let _ = arrays.point.set(py, point.unbind());
+            let _ = hits.point.set(py, point.unbind());
         }
         if let Some(normal) = normal {
-            let _ = arrays.normal.set(py, normal.unbind());
+            let _ = hits.normal.set(py, normal.unbind());
         }
-        arrays
+        hits
     }
 }
 
 #[pymethods]
 impl Hits {
-    /// Distance in lengths of the direction: float32.
-    #[getter]
-    fn t<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<f32>> {
-        self.arrays.t.bind(py).clone()
-    }
-
-    /// Place of the triangle in the faces of its mesh, or of the segment in its curves: int32.
-    #[getter]
-    fn triangle<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<i32>> {
-        self.arrays.triangle.bind(py).clone()
-    }
-
-    /// Place of the mesh in the list of meshes: int32.
-    #[getter]
-    fn mesh<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<i32>> {
-        self.arrays.mesh.bind(py).clone()
-    }
-
-    /// Place of the instance in the list of instances, -1 for meshes in the world itself: int32.
-    #[getter]
-    fn instance<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<i32>> {
-        self.arrays.instance.bind(py).clone()
-    }
-
-    /// Weights of the second and third corner of the triangle: float32 of shape (..., 2). On a curve, the share of the
-    /// segment's length, and the place across the curve from 0 to 1.
-    #[getter]
-    fn uv<'py>(&self, py: Python<'py>) -> Bound<'py, PyArrayDyn<f32>> {
-        self.arrays.uv.bind(py).clone()
-    }
-
     /// Whether the ray hits anything: bool.
     #[getter]
     fn hit<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let triangle = self.arrays.triangle.bind(py);
+        let triangle = self.triangle.bind(py);
         triangle.rich_compare(0, CompareOp::Ge)
     }
 
     /// Point of the triangle that is hit: float64 of shape (..., 3). Made on first use.
     #[getter]
     fn point<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        self.arrays.point(py, self.source.as_ref())
+        let of = |source: &Source, meshes: &Meshes<'_>, hit: At| {
+            let point = meshes.point(hit.ids, hit.uv);
+            point.or_else(|| source.point_on_ray(hit.t, hit.place))
+        };
+        self.vectors(py, &self.point, f64::NAN, of)
     }
 
     /// Geometric normal, of length 1: float32 of shape (..., 3). A triangle's corners run counterclockwise seen from where
     /// it points. The normal of a curve is perpendicular to its axis and faces the ray. Made on first use.
     #[getter]
     fn normal<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
-        self.arrays.normal(py, self.source.as_ref())
+        let of = |source: &Source, meshes: &Meshes<'_>, hit: At| {
+            meshes.normal(hit.ids).or_else(|| source.normal_on_ray(hit))
+        };
+        self.vectors(py, &self.normal, f32::NAN, of)
     }
 
     /// Number of the curve in its ``Curves``, -1 for hits on anything else: int32. Made on every use.
@@ -439,8 +382,8 @@ impl Hits {
     fn curve<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<i32>>> {
         let parts = &self.source.as_ref().ok_or_else(gone)?.parts;
         let of = |hit: At| Some(parts.along_curve(hit.ids, hit.uv[0])?.0);
-        let curves = self.arrays.each(py, -1, of)?;
-        shaped(py, curves, &self.arrays.shape(py))
+        let curves = self.each(py, -1, of)?;
+        shaped(py, curves, &self.lengths(py))
     }
 
     /// How far along the curve, each of whose pieces is 1 long: float32. NaN for hits on anything else. Made on every use.
@@ -451,18 +394,18 @@ impl Hits {
     fn along<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f32>>> {
         let parts = &self.source.as_ref().ok_or_else(gone)?.parts;
         let of = |hit: At| Some(parts.along_curve(hit.ids, hit.uv[0])?.1);
-        let along = self.arrays.each(py, f32::NAN, of)?;
-        shaped(py, along, &self.arrays.shape(py))
+        let along = self.each(py, f32::NAN, of)?;
+        shaped(py, along, &self.lengths(py))
     }
 
     fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
-        let shape = self.arrays.shape(py);
+        let shape = self.lengths(py);
         let len = shape.first().copied();
         len.ok_or_else(|| PyTypeError::new_err("one hit has no length"))
     }
 
     fn __getitem__<'py>(&self, py: Python<'py>, index: &Bound<'py, PyAny>) -> PyResult<Self> {
-        self.of(py, &self.chosen(py, index)?)
+        self.of(&self.chosen(py, index)?)
     }
 
     /// A table of the hits, such as ``pandas.DataFrame`` takes: one row for each ray, in C order.
@@ -506,17 +449,16 @@ impl Hits {
     }
 
     fn __sizeof__(&self, py: Python<'_>) -> usize {
-        let arrays = &self.arrays;
-        let count: usize = arrays.shape(py).iter().product();
-        let point = arrays.point.get(py).map_or(0, |_| 24);
-        let normal = arrays.normal.get(py).map_or(0, |_| 12);
+        let count: usize = self.lengths(py).iter().product();
+        let point = self.point.get(py).map_or(0, |_| 24);
+        let normal = self.normal.get(py).map_or(0, |_| 12);
         size_of::<Self>() + count * (24 + point + normal)
     }
 
     /// Shape of the rays.
     #[getter]
     fn shape<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, pyo3::types::PyTuple>> {
-        pyo3::types::PyTuple::new(py, self.arrays.shape(py))
+        pyo3::types::PyTuple::new(py, self.lengths(py))
     }
 
     #[staticmethod]
@@ -527,10 +469,7 @@ impl Hits {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> Reduced<'py, (State<'py>,)> {
         let py = slf.py();
-        Ok((
-            slf.get_type().getattr("_restore")?,
-            (slf.get().arrays.state(py),),
-        ))
+        Ok((slf.get_type().getattr("_restore")?, (slf.get().state(py),)))
     }
 
     /// Refuses ``np.asarray``: hits are several arrays.
