@@ -23,7 +23,7 @@ REPLICATION, PERFORMANCE, COSTS = (f"docs/src/{n}.md" for n in ("replication", "
 # Figures of a group of pages may be on any of them.
 RESULTS = ("docs/src/results.md", "docs/src/beyond-static-order.md")
 ORDER, EMBREE = (f"docs/src/{n}.md" for n in ("occlusion-order", "order-in-embree"))
-BAKING = tuple(f"docs/src/{n}.md" for n in ("occlusion-baking", "bakes", "sun-and-sky", "visibility"))
+BAKING = tuple(f"docs/src/{n}.md" for n in ("occlusion-baking", "bakes", "sun-and-sky", "visibility", "horizons"))
 PYTHON = ("docs/src/python/index.md", "docs/src/python/scenes.md")
 RELIABILITY, BENCH = "docs/src/reliability.md", "bench/performance.md"
 MOVING = "docs/src/moving-scenes.md"
@@ -403,7 +403,7 @@ SOURCES = {
         ("1.2 m above the floor and 0.3 m above the sill", "cited"),
         ("k, by default 0.13 (Gauss)", "fields/bake/src/sight/curvature.rs", "REFRACTION: f64 = 0.13;"),
         ("by default 6 371 008.8 m", "fields/bake/src/sight/curvature.rs", "EARTH_RADIUS: f64 = 6_371_008.8;"),
-        ("less than 1e-12 count as equal", "fields/bake/src/rasters/sweep.rs", "GRAZING: f64 = 1e-12;"),
+        ("less than 1e-12 count as equal", "fields/terrain/src/viewshed/sector.rs", "GRAZING: f64 = 1e-12;"),
         ("differ by 1.9 degrees at Munich", "pictures/raster/src/crs.rs", "(near.north + 1.91).abs() < 0.01"),
         ("Web Mercator (EPSG:3857)", "defined"),
         ("differ by more than 2 %", "pictures/raster/src/crs.rs", "MOST_STRETCH: f64 = 0.02;"),

@@ -106,6 +106,34 @@ pub enum Error {
     Cancelled,
 }
 
+impl From<antumbra_terrain::Error> for Error {
+    fn from(error: antumbra_terrain::Error) -> Self {
+        use antumbra_terrain::Error;
+        match error {
+            Error::Length {
+                what,
+                found,
+                wanted,
+            } => Self::Length {
+                what,
+                found,
+                wanted,
+            },
+            Error::Range {
+                what,
+                found,
+                wanted,
+            } => Self::Range {
+                what,
+                found,
+                wanted,
+            },
+            Error::NoMemory { what, items, bytes } => Self::NoMemory { what, items, bytes },
+            _ => Self::Cancelled,
+        }
+    }
+}
+
 impl Error {
     /// Refuses a list of another length than wanted.
     pub(crate) fn check_length(
@@ -113,13 +141,7 @@ impl Error {
         found: usize,
         wanted: usize,
     ) -> Result<(), Self> {
-        let is_right = found == wanted;
-        let error = Self::Length {
-            what,
-            found,
-            wanted,
-        };
-        is_right.then_some(()).ok_or(error)
+        Ok(antumbra_terrain::Error::check_length(what, found, wanted)?)
     }
 
     /// Refuses a number that is not in its range.
@@ -129,11 +151,7 @@ impl Error {
         is_in: bool,
         wanted: &'static str,
     ) -> Result<(), Self> {
-        let error = Self::Range {
-            what,
-            found,
-            wanted,
-        };
-        is_in.then_some(()).ok_or(error)
+        let checked = antumbra_terrain::Error::check_range(what, found, is_in, wanted);
+        Ok(checked?)
     }
 }

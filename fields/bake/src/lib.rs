@@ -27,7 +27,8 @@
 //! | how much energy does each point receive from the sun and the sky | [`SunJob`], [`run`] | [`SunValues`] |
 //! | how much of the light of a surface arrives at others | [`view_factors`], [`ViewFactorJob`] | `f64`, surfaces x surfaces |
 //! | which cells of a height raster does each observer see | [`ViewshedJob`], [`run`] | [`Viewsheds`] |
-//! | how high is the horizon in each azimuth | [`HorizonJob`], [`FieldHorizonJob`], [`run`] | `f32`, points x azimuths |
+//! | how high is the horizon in each azimuth | [`HorizonJob`], [`run`] | `f32`, points x azimuths |
+//! | how high is the horizon of each cell of a height raster | [`FieldHorizonJob`], [`run`] | `f32`, directions x cells |
 //! | which points see each other | [`sees_points`], [`sees_each_other`] | [`BitMatrix`], points x points |
 //!
 //! All of them take slices of `[f32; 3]` in the coordinates of the tree, and a [`Monitor`], which receives the progress and may
@@ -76,18 +77,15 @@
 //!   bit per answer;  `directions`: directions over a hemisphere;  `curvature`: lines of sight over a round earth
 //! - `sun`: `position`: where the sun is;  `sky`, `perez`: the sky in patches, and its light;  `moment`, `clock`, `epw`: dates, time
 //!   zones, weather files;  `sunlight`: the job of a period;  `exposure`, `hourly`, `measures`: sums, steps and classes
-//! - `rasters`: `height_field`: heights as a surface;  `viewshed`, `field_horizon`: one job each;  `sweep`, `horizon`: edges of the
-//!   field as an eye sees them
+//! - `rasters`: `viewshed`, `field_horizon`: one job each of a height raster, which `antumbra-terrain` answers without rays
 //! - `files`: `npz`: arrays for numpy;  `ply`, `glb`: meshes with a value at every vertex
 //! - `vector`, `orientation`: vectors, and where up and north are in a scene
-//! - `monitor`: progress and cancellation;  `error`: why there is no result;  `memory`: lists that may not fit
+//! - `error`: why there is no result
 #![forbid(unsafe_code)]
 
 mod error;
 mod files;
 mod jobs;
-mod memory;
-mod monitor;
 mod orientation;
 mod points;
 mod rasters;
@@ -95,10 +93,12 @@ mod sight;
 mod sun;
 mod vector;
 
+pub use antumbra_terrain::{Direction, HeightField, Lattice, Limits, Monitor, Observer};
+use antumbra_terrain::{Progress, memory};
+
 pub use error::Error;
 pub use files::*;
 pub use jobs::*;
-pub use monitor::Monitor;
 pub use orientation::{Orientation, UpAxis};
 pub use points::*;
 pub use rasters::*;

@@ -1,5 +1,7 @@
 //! Where up and north are in a scene.
 
+use antumbra_terrain::angles::sin_cos_degrees;
+
 use crate::Error;
 use crate::vector::{cross, dot, unit};
 
@@ -99,25 +101,6 @@ impl Orientation {
     /// Vector in terms of east, north and up of one in the scene.
     pub fn local(&self, vector: [f64; 3]) -> [f64; 3] {
         [self.east, self.north, self.up].map(|axis| dot(axis, vector))
-    }
-}
-
-/// Refuses azimuths that are not finite.
-pub(crate) fn check_azimuths(azimuths: &[f64]) -> Result<(), Error> {
-    let wanted = "a finite angle in degrees";
-    let mut azimuths = azimuths.iter();
-    azimuths.try_for_each(|&x| Error::check_range("azimuth", x, x.is_finite(), wanted))
-}
-
-/// Sine and cosine of an angle in degrees; exact at right angles.
-pub(crate) fn sin_cos_degrees(angle: f64) -> (f64, f64) {
-    match angle.rem_euclid(360.0) {
-        0.0 => (0.0, 1.0),
-        90.0 => (1.0, 0.0),
-        180.0 => (0.0, -1.0),
-        270.0 => (-1.0, 0.0),
-        // The system's own functions differ in their last bits.
-        angle => libm::sincos(angle.to_radians()),
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use antumbra_mesh::{Warning, plain_material};
-use antumbra_raster::{Crs, Raster, companions, read, unit_name};
+use antumbra_raster::{Crs, Purpose, Raster, companions, read, unit_name};
 use antumbra_scene::TriangleMesh;
 use glam::DVec3;
 
@@ -14,7 +14,7 @@ use crate::{Error, Extent, Options};
 
 /// Reads a raster as the surface between the centres of its cells, measured from `origin`, within `limit` bytes.
 pub fn load(path: &Path, name: String, limit: u64, origin: DVec3) -> Result<Loaded, Error> {
-    let raster = read(path, limit)?;
+    let raster = read(path, limit, Purpose::Mesh)?;
     let warnings = warnings(path, &raster);
     let surface = raster.mesh(origin.to_array());
     let cells = raster.into_cells(&surface);
@@ -52,7 +52,7 @@ pub struct Heights {
 /// # Errors
 /// The file has mistakes, or takes more memory than allowed. With [`Options::strict`], warnings are errors, too.
 pub fn load_heights(path: &Path, options: &Options) -> Result<Heights, Error> {
-    let raster = read(path, options.max_memory.bytes())?;
+    let raster = read(path, options.max_memory.bytes(), Purpose::Values)?;
     let warnings = warnings(path, &raster);
     if options.strict && !warnings.is_empty() {
         return Err(Error::Strict(warnings));

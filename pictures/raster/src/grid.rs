@@ -92,8 +92,6 @@ pub(crate) fn check_size([width, height]: [usize; 2], room: u64) -> Result<(), S
             "found {width} x {height} cells, wanted at least 2 x 2"
         ));
     }
-    // Cells are numbered by 32 bits.
-    let room = room.min(u64::from(u32::MAX));
     match cells <= u128::from(room) {
         true => Ok(()),
         false => Err(format!(

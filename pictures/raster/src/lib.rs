@@ -28,7 +28,7 @@ mod npy;
 mod pixels;
 
 use std::fs::{self, File};
-use std::io::{self, Cursor, Read};
+use std::io::{self, Cursor, Read, Write};
 use std::path::{Path, PathBuf};
 
 pub use crs::{Crs, Site, unit_name};
@@ -81,10 +81,27 @@ pub struct Raster {
     pub height_factor: Option<f64>,
 }
 
-/// Bytes of memory for each cell of a raster as a mesh: its value, vertex, normal and two triangles.
-const PER_CELL: u64 = 8 + 12 + 12 + 24 + 8;
+/// What a raster is read for, which says how much memory its cells take.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Purpose {
+    /// Its values, of 8 bytes, and as much for what is made of them.
+    Values,
+    /// Its mesh besides: vertices, normals and two triangles for each cell. At most 2³² - 1 cells, since vertices are numbered by 32
+    /// bits.
+    Mesh,
+}
 
-/// Reads a raster by its extension, within `max_bytes` of memory for the file, its values and its mesh.
+impl Purpose {
+    /// Cells that so many bytes have room for.
+    fn room(self, bytes: u64) -> u64 {
+        match self {
+            Self::Values => bytes / (8 + 8),
+            Self::Mesh => (bytes / (8 + 12 + 12 + 24 + 8)).min(u32::MAX.into()),
+        }
+    }
+}
+
+/// Reads a raster by its extension, within `max_bytes` of memory for the file and for what is made of its cells.
 ///
 /// | format | values | georeference |
 /// |---|---|---|
@@ -99,13 +116,13 @@ const PER_CELL: u64 = 8 + 12 + 12 + 24 + 8;
 /// # Errors
 /// [`Error::Io`], or [`Error::Broken`] with the reason. Rasters in degrees are refused, since their cells have no length, and so are
 /// those in systems such as Web Mercator, whose lengths at the middle of the raster are not those on the ground: see [`Site::stretch`].
-pub fn read(path: &Path, max_bytes: u64) -> Result<Raster, Error> {
+pub fn read(path: &Path, max_bytes: u64, purpose: Purpose) -> Result<Raster, Error> {
     let broken = |reason: String| Error::Broken {
         path: path.to_path_buf(),
         reason,
     };
     let bytes = read_file(path, max_bytes)?;
-    let room = (max_bytes - bytes.len() as u64) / PER_CELL;
+    let room = purpose.room(max_bytes - bytes.len() as u64);
     let check = |[width, height]: [usize; 2]| grid::check_size([width, height], room);
     let mut raster = match extension(path).as_str() {
         "tif" | "tiff" => {
@@ -165,30 +182,65 @@ pub struct Quantity<'a> {
     pub unit: &'a str,
 }
 
-/// Values of the cells of a grid as the bytes of a file; NaN is no data.
+/// Writes planes of values of all cells as a `.npy`, `[planes, height, width]`, one after the other: only one is in memory.
+///
+/// # Errors
+/// All of the file, and of `plane`, which makes each of them.
+///
+/// # Panics
+/// If a plane has not as many values as there are cells.
+pub fn write_planes(
+    file: &mut dyn Write,
+    grid: &Grid,
+    planes: usize,
+    plane: &mut dyn FnMut(usize) -> io::Result<Vec<f32>>,
+) -> io::Result<()> {
+    file.write_all(&npy::head(grid, planes))?;
+    for index in 0..planes {
+        let values = plane(index)?;
+        assert_eq!(values.len(), grid.width * grid.height, "one value per cell");
+        for values in values.chunks(1 << 14) {
+            let bytes: Vec<u8> = values
+                .iter()
+                .flat_map(|value| value.to_le_bytes())
+                .collect();
+            file.write_all(&bytes)?;
+        }
+    }
+    Ok(())
+}
+
+/// Values of the cells of a grid as the bytes of a file; NaN is no data. Where cells have several values, they come plane by plane.
 ///
 /// | format | holds |
 /// |---|---|
 /// | `.tif`, `.tiff` | one band of 32-bit floats, deflated, with the georeference, name and unit |
 /// | `.asc` | an ESRI ASCII grid; cells must be squares with rows from north to south |
-/// | `.npy` | `[height, width]` of 32-bit floats, without a georeference |
+/// | `.npy` | `[height, width]` of 32-bit floats, or `[planes, height, width]`, without a georeference |
 ///
 /// # Errors
 /// [`Error::Unwritable`] if the format cannot hold the grid.
 ///
 /// # Panics
-/// If there are not as many values as cells.
+/// If there are not as many values as cells, or a multiple.
 pub fn write(
     path: &Path,
     grid: &Grid,
     values: &[f32],
     quantity: Quantity<'_>,
 ) -> Result<Vec<u8>, Error> {
-    assert_eq!(values.len(), grid.width * grid.height, "one value per cell");
+    let cells = grid.width * grid.height;
+    assert!(
+        values.len() == cells || values.len() > cells && values.len().is_multiple_of(cells),
+        "values for each cell"
+    );
     let written = match extension(path).as_str() {
+        "npy" => Ok(npy::write(grid, values)),
+        "tif" | "tiff" | "asc" if values.len() > cells => {
+            Err("it has one value for each cell; .npy has several".into())
+        }
         "tif" | "tiff" => geotiff::write(grid, values, quantity),
         "asc" => asc::write(grid, values),
-        "npy" => Ok(npy::write(grid, values)),
         other => Err(format!("`{other}` is no extension of a raster")),
     };
     written.map_err(|reason| Error::Unwritable {

@@ -1,7 +1,5 @@
 //! Arrays of numpy (.npy), version 1 to 3 of the format.
 
-use std::io::Write as _;
-
 use crate::grid::check_transform;
 use crate::{Grid, Raster};
 
@@ -130,22 +128,28 @@ fn numbers(kind: &str, data: &[u8], count: usize) -> Result<Vec<f64>, String> {
     }
 }
 
-/// Writes an array of 32-bit floats.
-pub fn write(grid: &Grid, values: &[f32]) -> Vec<u8> {
+/// What is before the numbers of an array of 32-bit floats; of three dimensions if there are several planes of values.
+pub fn head(grid: &Grid, planes: usize) -> Vec<u8> {
     let (height, width) = (grid.height, grid.width);
-    let mut head =
-        format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({height}, {width}), }}");
+    let planes = match planes {
+        0 | 1 => String::new(),
+        planes => format!("{planes}, "),
+    };
+    let mut head = format!(
+        "{{'descr': '<f4', 'fortran_order': False, 'shape': ({planes}{height}, {width}), }}"
+    );
     // Data begin at a multiple of 64 bytes, and the header ends with a line.
     let before = MAGIC.len() + 4;
     let padding = (64 - (before + head.len() + 1) % 64) % 64;
     head.extend(std::iter::repeat_n(' ', padding));
     head.push('\n');
-    let mut bytes = Vec::with_capacity(before + head.len() + 4 * values.len());
-    bytes.extend(MAGIC);
-    bytes.extend([1, 0]);
-    bytes.extend((head.len() as u16).to_le_bytes());
-    // Never fails in memory.
-    let _ = bytes.write_all(head.as_bytes());
+    let length = (head.len() as u16).to_le_bytes();
+    [MAGIC, &[1, 0], &length, head.as_bytes()].concat()
+}
+
+/// Writes an array of 32-bit floats; of three dimensions if there are several values for each cell, plane by plane.
+pub fn write(grid: &Grid, values: &[f32]) -> Vec<u8> {
+    let mut bytes = head(grid, values.len() / (grid.height * grid.width).max(1));
     bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
     bytes
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use antumbra_raster::read;
+use antumbra_raster::{Purpose, read};
 
 #[test]
 fn files_of_gdal_are_read_as_gdal_reads_them() {
@@ -11,7 +11,7 @@ fn files_of_gdal_are_read_as_gdal_reads_them() {
     let mut counts = [0; 2];
     for line in text.lines() {
         let (name, rest) = line.split_once(' ').expect("a name");
-        let found = read(&folder.join(name), 1 << 22);
+        let found = read(&folder.join(name), 1 << 22, Purpose::Mesh);
         if let Some(words) = rest.strip_prefix("! ") {
             let error = found.expect_err(name).to_string();
             assert!(error.contains(words), "{name}: {error}");

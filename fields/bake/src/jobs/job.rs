@@ -6,7 +6,7 @@ use antumbra::{Bvh, Ray};
 use rayon::prelude::*;
 use xxhash_rust::xxh3::Xxh3;
 
-use crate::monitor::Progress;
+use crate::Progress;
 use crate::points::curve::Places;
 use crate::{Error, Monitor, memory};
 

@@ -1,114 +1,40 @@
-//! Viewsheds of height fields: the cells that observers see, exactly and without rays.
+//! Viewsheds of height fields as a job, and runs of cells that keep them small.
 
 use std::ops::Range;
 
 use antumbra::Bvh;
-use rayon::prelude::*;
+use antumbra_terrain::{HeightField, Limits, Observer, Viewer, memory};
 
 use crate::jobs::job::in_pieces;
-use crate::rasters::height_field::{HeightField, Observer, Side};
-use crate::rasters::sweep::{Limits, SECTORS, Sector};
-use crate::vector::dot;
-use crate::{Answers, BitMatrix, Error, Job, Key, Monitor, Numbers, Size, memory};
+use crate::{Answers, BitMatrix, Error, Job, Key, Monitor, Numbers, Size};
 
-/// Job of [`Viewsheds`]: which cells of a height field each observer sees.
-///
-/// A cell is seen if no part of the surface is strictly above the line from the eye to the centre of the cell, raised by the height
-/// of targets. [`HeightField`] says what the surface is. A line may touch the surface: slopes of lines that differ by less than 1e-12
-/// count as equal. Cells without data are not seen. An observer sees its own cell, and nothing if its eye is below the surface.
-///
-/// All is computed in double precision. Bits are the same for any number of threads and shares.
-#[derive(Clone, Debug)]
+/// Job of [`Viewsheds`]: which cells of a height field each observer sees, as [`Viewer`] says.
 pub struct ViewshedJob<'a> {
-    /// Surface with the cells that observers look at.
-    pub field: &'a HeightField<'a>,
-    /// Who looks.
-    pub observers: &'a [Observer],
-    /// Height of targets above the surface.
-    pub target: f64,
-    /// Height that places lose per squared distance, as of [`Curvature::factor`](crate::Curvature::factor); 0 on a flat earth.
-    pub drop: f64,
-    /// Greatest distance in plan; infinite for all cells.
-    pub range: f64,
+    viewer: Viewer<'a>,
+    observers: &'a [Observer],
+    limits: Limits,
 }
 
-impl ViewshedJob<'_> {
-    /// Whether the eye of an observer is below the surface.
-    pub fn is_buried(&self, observer: &Observer) -> bool {
-        self.field.buries(observer)
+impl<'a> ViewshedJob<'a> {
+    /// The job of these observers.
+    ///
+    /// # Errors
+    /// [`Error::NoMemory`].
+    pub fn new(
+        field: &'a HeightField<'a>,
+        observers: &'a [Observer],
+        limits: Limits,
+    ) -> Result<Self, Error> {
+        Ok(Self {
+            viewer: Viewer::new(field)?,
+            observers,
+            limits,
+        })
     }
 
-    /// The cells that an observer sees, as runs: see [`encode`].
-    fn runs(&self, observer: &Observer) -> Result<Vec<u8>, Error> {
-        let cells = self.field.heights().len();
-        let mut seen = memory::filled("cells", cells.div_ceil(64), 0)?;
-        if observer.is_finite() && !self.is_buried(observer) {
-            self.see_own_cell(observer, &mut seen);
-            let limits = Limits {
-                target: self.target,
-                drop: self.drop,
-                range: self.range,
-            };
-            let sectors: Vec<_> = Side::ALL
-                .into_iter()
-                .flat_map(|side| (0..SECTORS).map(move |i| (side, i)))
-                .collect();
-            let found: Vec<_> = sectors
-                .par_iter()
-                .map(|&(side, index)| {
-                    Sector::new(self.field, observer, limits, side, index).sweep()
-                })
-                .collect();
-            for (&(side, _), parts) in sectors.iter().zip(found) {
-                let view = self.field.view(side, observer.place);
-                for (line, range) in parts {
-                    for at in range {
-                        let cell = view.cell(line as usize, at as usize);
-                        seen[cell / 64] |= 1 << (cell % 64);
-                    }
-                }
-            }
-            self.hide_behind_normal(observer, &mut seen);
-        }
-        encode(cells, &seen)
-    }
-
-    /// Marks the cell that the observer is exactly above.
-    fn see_own_cell(&self, observer: &Observer, seen: &mut [u64]) {
-        let [width, height] = self.field.size();
-        let [column, row] = observer.place;
-        let is_centre = column.fract() == 0.0 && row.fract() == 0.0;
-        let is_inside =
-            (0.0..width as f64).contains(&column) && (0.0..height as f64).contains(&row);
-        if is_centre && is_inside {
-            let cell = row as usize * width + column as usize;
-            if self.field.heights()[cell].is_finite() {
-                seen[cell / 64] |= 1 << (cell % 64);
-            }
-        }
-    }
-
-    /// Removes cells that are behind the surface of an observer.
-    fn hide_behind_normal(&self, observer: &Observer, seen: &mut [u64]) {
-        if observer.normal == [0.0; 3] {
-            return;
-        }
-        let [width, _] = self.field.size();
-        for (index, word) in seen.iter_mut().enumerate() {
-            let seen = *word;
-            for bit in (0..64).filter(|bit| seen >> bit & 1 != 0) {
-                let cell = 64 * index + bit;
-                let at = [cell % width, cell / width].map(|at| at as f64);
-                let [x, y] = observer.place;
-                let [east, north] = self.field.along([at[0] - x, at[1] - y]);
-                let drop = self.drop * (east * east + north * north);
-                let up = self.field.heights()[cell] + self.target - drop - observer.height;
-                let apart = [east, north, up];
-                if apart != [0.0; 3] && dot(observer.normal, apart) <= 0.0 {
-                    *word &= !(1 << bit);
-                }
-            }
-        }
+    /// Number of cells.
+    fn cells(&self) -> usize {
+        self.viewer.field().heights().len()
     }
 }
 
@@ -121,33 +47,32 @@ impl Job for ViewshedJob<'_> {
     fn size(&self) -> Size {
         Size {
             items: self.observers.len(),
-            rays: self.field.heights().len() as u64,
+            rays: self.cells() as u64,
             // Runs of cells; an observer that sees nothing has the fewest.
             numbers: Numbers::AtLeast(8),
         }
     }
 
     fn identify(&self, key: &mut Key) {
-        let options = (
-            self.field.size(),
-            self.field.transform(),
-            self.target,
-            self.drop,
-            self.range,
-        );
+        let (field, limits) = (self.viewer.field(), &self.limits);
+        let (target, drop, range) = (limits.target, limits.drop, limits.range);
+        let options = (field.size(), field.transform(), target, drop, range);
         key.text(&format!("{options:?}"));
         key.text(&format!("{:?}", self.observers));
-        key.numbers(self.field.heights());
+        key.numbers(field.heights());
     }
 
     fn answers(&self, _: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers<Self> {
         in_pieces(items, 1, monitor, |item| {
-            self.runs(&self.observers[item.start])
+            let seen = self
+                .viewer
+                .sees(&self.observers[item.start], &self.limits)?;
+            encode(self.cells(), &seen)
         })
     }
 
     fn found(&self, bytes: Vec<u8>) -> Result<Viewsheds, Error> {
-        let cells = self.field.heights().len();
+        let cells = self.cells();
         let mut observers = memory::room("viewsheds", self.observers.len())?;
         let mut rest = &bytes[..];
         while !rest.is_empty() {

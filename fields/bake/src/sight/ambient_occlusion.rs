@@ -3,8 +3,8 @@
 use antumbra::{Bvh, Ray};
 use rayon::prelude::*;
 
+use crate::Progress;
 use crate::memory;
-use crate::monitor::Progress;
 use crate::points::curve::Places;
 use crate::sight::directions::{Samples, key};
 use crate::vector::{above, unit};
@@ -192,7 +192,7 @@ fn bake<T: Copy + Send + Sync>(
             let range = first..first + values.len();
             worker.bake(&points[range.clone()], &normals[range], values, &finish)?;
             progress.add(values.len());
-            Ok(())
+            Ok::<_, Error>(())
         },
     )?;
     places.put_back(1, &mut values);

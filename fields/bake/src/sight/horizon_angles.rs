@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use antumbra::{Bvh, Ray};
+use antumbra_terrain::angles::check_azimuths;
 use rayon::prelude::*;
 
-use crate::orientation::check_azimuths;
 use crate::points::curve::Places;
 use crate::vector::{above, dot, unit};
 use crate::{Answers, Error, Job, Key, Monitor, Orientation, Size, memory, sees_directions};

@@ -5,8 +5,8 @@ use std::ops::Range;
 use antumbra::{Aabb, Bvh, Directions, LocalOrigin, Ray, RayOrder};
 use rayon::prelude::*;
 
+use crate::Progress;
 use crate::memory;
-use crate::monitor::Progress;
 use crate::points::curve::{Places, along_curve};
 use crate::sight::bits::BitMatrix;
 use crate::vector::{above, dot, less, unit};

@@ -1,7 +1,9 @@
 //! The sky in patches.
 
+use antumbra_terrain::angles::sin_cos_degrees;
+
 use crate::Error;
-use crate::orientation::{Orientation, sin_cos_degrees};
+use crate::orientation::Orientation;
 use crate::vector::dot;
 
 /// How the sky above the horizon is divided.

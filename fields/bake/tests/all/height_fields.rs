@@ -2,10 +2,11 @@
 
 use antumbra::{Bvh, Recipe};
 use antumbra_bake::{
-    EARTH_RADIUS, Error, HeightField, Key, Observer, Part, REFRACTION, ViewshedJob, Viewsheds,
+    EARTH_RADIUS, HeightField, Key, Limits, Observer, Part, REFRACTION, ViewshedJob, Viewsheds,
     Work, run,
 };
 use antumbra_raster::{Grid, Raster};
+use antumbra_terrain::Error;
 
 fn tree() -> Bvh {
     Bvh::build(&[], &Recipe::default()).expect("a tree")
@@ -132,13 +133,12 @@ impl Case {
     }
 
     fn job<'a>(&self, field: &'a HeightField<'a>, observers: &'a [Observer]) -> ViewshedJob<'a> {
-        ViewshedJob {
-            field,
-            observers,
+        let limits = Limits {
             target: self.target,
             drop: self.drop,
             range: self.range,
-        }
+        };
+        ViewshedJob::new(field, observers, limits).expect("memory")
     }
 
     fn squared(&self, [c, r]: [f64; 2]) -> f64 {

@@ -2,7 +2,7 @@
 
 use antumbra::{Bvh, Geometry, Recipe};
 use antumbra_bake::{
-    Curvature, EARTH_RADIUS, Eyes, HeightField, Observer, Orientation, REFRACTION, Sensors,
+    Curvature, EARTH_RADIUS, Eyes, HeightField, Limits, Observer, Orientation, REFRACTION, Sensors,
     ViewshedJob, VisibilityJob, run,
 };
 use antumbra_raster::{Grid, Raster};
@@ -72,13 +72,11 @@ impl Terrain {
             normal: [0.0; 3],
         };
         let observers: Vec<Observer> = observers.iter().map(observer).collect();
-        let job = ViewshedJob {
-            field: &field,
-            observers: &observers,
-            target: 0.0,
+        let limits = Limits {
             drop: self.curvature.factor(),
-            range: f64::INFINITY,
+            ..Limits::default()
         };
+        let job = ViewshedJob::new(&field, &observers, limits).expect("memory");
         let bvh = Bvh::build(&[], &Recipe::default()).expect("a tree");
         let found = run(&job, &bvh, &()).expect("viewsheds");
         let cells = |observer: usize| {

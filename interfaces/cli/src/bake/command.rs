@@ -170,7 +170,23 @@ struct Document<'a> {
     figures: Figures<'a>,
 }
 
+impl<T> Done<T> {
+    /// A job that was computed as a whole, without files of its chunks.
+    pub fn whole(found: T, seconds: f64) -> Self {
+        Self {
+            found: Some(found),
+            seconds,
+            checkpoint: None,
+        }
+    }
+}
+
 impl Bake<'_> {
+    /// Whether the command computes everything itself.
+    pub fn is_whole(&self) -> bool {
+        self.chunks.shard.is_none() && self.parts.is_none()
+    }
+
     /// Notes all files, with the files of these flags, and checks that outputs can be written.
     fn declare(&self, [written, read]: [Vec<Named<'_>>; 2]) -> Result<Files, Failure> {
         let is_shared = self.chunks.shard.is_some() || self.parts.is_some();

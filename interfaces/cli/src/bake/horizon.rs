@@ -1,12 +1,16 @@
 //! `antumbra horizon`: how high surfaces reach in each direction of the compass.
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use antumbra::LocalOrigin;
-use antumbra_bake::{Array, Entry, FieldHorizonJob, HorizonJob, Observer, Orientation, Sensors};
+use antumbra_bake::{
+    Array, Direction, Entry, FieldHorizonJob, HorizonJob, Lattice, Monitor, Orientation, Sensors,
+};
+use antumbra_image::atomic_write;
 use antumbra_lab::count;
-use antumbra_raster::{Quantity, RasterCells};
+use antumbra_raster::{Grid, Quantity};
 use clap::{ArgGroup, Args};
 
 use super::command::{Bake, Baking, Done, Figure, Named};
@@ -19,7 +23,8 @@ use crate::args::{ChunkArgs, PlaceArgs, RasterArgs, SCENE, SCENE_LONG, heading, 
 use crate::exit::{Failure, tell};
 use crate::interrupt;
 use crate::json::Destination;
-use crate::output::Files;
+use crate::output::{Files, check_room, is_one_of};
+use crate::progress::Progress;
 
 /// Name and unit of rasters.
 const QUANTITY: Quantity<'static> = Quantity {
@@ -45,9 +50,13 @@ pub struct HorizonArgs {
     /// Figures as JSON; - is the standard output
     #[arg(long, value_name = "FILE|-", help_heading = heading::OUTPUT)]
     pub json: Option<Destination>,
-    /// Number of azimuths, evenly spread
-    #[arg(long, value_name = "N", default_value_t = 36, value_parser = clap::value_parser!(u32).range(1..=3600), help_heading = heading::WORK)]
-    pub azimuths: u32,
+    /// Number of azimuths, evenly spread, or lattice:N
+    ///
+    /// A lattice has the azimuths of steps between the cells of a raster. So lines of sight pass through cells, and one sweep answers all
+    /// of them. lattice:8, 16, 32, 48 and 80 have steps of at most 1, 2, 3, 4 and 5 columns and rows. Azimuths are not evenly
+    /// spread, and results name them. By default lattice:16 for --cells of a raster, else 36.
+    #[arg(long, value_name = "N", value_parser = Azimuths::parse, help_heading = heading::WORK)]
+    pub azimuths: Option<Azimuths>,
     /// The first azimuth; north is 0, east 90
     #[arg(long, value_name = "DEGREES", default_value_t = 0.0, allow_negative_numbers = true, value_parser = values::finite, help_heading = heading::WORK)]
     pub first: f64,
@@ -57,12 +66,41 @@ pub struct HorizonArgs {
     pub chunks: ChunkArgs,
 }
 
+/// How azimuths are chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Azimuths {
+    /// So many, evenly spread.
+    Even(u32),
+    /// A lattice of so many.
+    Lattice(usize),
+}
+
+impl Azimuths {
+    fn parse(text: &str) -> Result<Self, String> {
+        let wanted = "wanted 1 to 3600, or lattice:8, lattice:16, lattice:32, ...";
+        let found = match text.strip_prefix("lattice:") {
+            Some(count) => count.parse().ok().map(Self::Lattice),
+            None => text.parse().ok().map(Self::Even),
+        };
+        let is_in = |azimuths: &Self| !matches!(azimuths, Self::Even(0) | Self::Even(3601..));
+        found.filter(is_in).ok_or_else(|| wanted.to_owned())
+    }
+}
+
 impl HorizonArgs {
-    /// Degrees from north through east, from 0 to 360.
-    pub fn degrees(&self) -> Vec<f64> {
-        let step = 360.0 / f64::from(self.azimuths);
-        let degrees =
-            (0..self.azimuths).map(|i| (self.first + f64::from(i) * step).rem_euclid(360.0));
+    /// How azimuths are chosen.
+    fn azimuths(&self) -> Azimuths {
+        let of_cells = || self.places.vertices && is_terrain(&self.scene, self.places.up);
+        self.azimuths.unwrap_or_else(|| match of_cells() {
+            true => Azimuths::Lattice(16),
+            false => Azimuths::Even(36),
+        })
+    }
+
+    /// Degrees of `count` azimuths from north through east, from 0 to 360.
+    fn degrees(&self, count: u32) -> Vec<f64> {
+        let step = 360.0 / f64::from(count);
+        let degrees = (0..count).map(|i| (self.first + f64::from(i) * step).rem_euclid(360.0));
         degrees.collect()
     }
 }
@@ -76,9 +114,21 @@ impl Baking for HorizonArgs {
                 continue;
             }
             places::check_raster(path, &self.places, &self.scene)?;
-            if self.azimuths != 1 {
-                let reason = "a raster has one azimuth: --azimuths 1 with --first";
+            let is_one = self.azimuths() == Azimuths::Even(1);
+            if !(is_one || self.places.vertices && has_planes(path)) {
+                let reason = "a raster has one azimuth: --azimuths 1 with --first; .npz and .npy of cells have all";
                 return Err(Failure::name(path, reason));
+            }
+        }
+        if matches!(self.azimuths(), Azimuths::Lattice(_)) {
+            if !(self.places.vertices && is_terrain(&self.scene, self.places.up)) {
+                let reason = "a lattice of azimuths is for --cells of a height raster";
+                return Err(Failure::Usage(reason.into()));
+            }
+            if self.first != 0.0 {
+                let reason =
+                    "--first is for azimuths that are evenly spread, and a lattice has its own";
+                return Err(Failure::Usage(reason.into()));
             }
         }
         places::check(&self.places)
@@ -89,10 +139,13 @@ impl Baking for HorizonArgs {
     }
 
     fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
-        let azimuths = self.degrees();
         if self.places.vertices && is_terrain(&self.scene, self.places.up) {
-            return of_cells(self, bake, files, &azimuths);
+            return of_cells(self, bake, files);
         }
+        let Azimuths::Even(count) = self.azimuths() else {
+            return Err(Failure::Usage("a lattice is for cells of a raster".into()));
+        };
+        let azimuths = self.degrees(count);
         let mut ground = bake.ground(&mut files, None)?;
         let up = ground.up(self.places.up)?;
         Asked::new(&self.raster, &self.places).of(&ground.loaded, up)?;
@@ -103,27 +156,22 @@ impl Baking for HorizonArgs {
         let horizon = Horizon {
             name: &ground.loaded.scene.name,
             azimuths: &azimuths,
-            sensors,
-            local: ground.local,
+            number: sensors.points.len(),
             triangles: ground.mesh.indices.len(),
             seconds: [ground.loaded.seconds, ground.build_seconds],
-            done: bake.compute(&job, &ground, &ground.bvh)?,
         };
+        let done = bake.compute(&job, &ground, &ground.bvh)?;
         let place = (self.raster.crs.as_ref(), self.places.units.metres());
-        horizon.write(bake, |path, angles| {
+        horizon.write(bake, (sensors, ground.local, &done), |path, angles| {
             raster::write(path, &ground, (sensors, angles), place, (up, QUANTITY))
         })?;
-        horizon.end(bake, || ground.tell(""))
+        let all = Sum::of(done.found.as_deref());
+        horizon.end(bake, all, &done, || ground.tell(""))
     }
 }
 
 /// The horizon of all cells of a height raster, without a mesh and without a tree.
-fn of_cells(
-    args: &HorizonArgs,
-    bake: &Bake<'_>,
-    mut files: Files,
-    azimuths: &[f64],
-) -> Result<(), Failure> {
+fn of_cells(args: &HorizonArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
     let terrain = bake.terrain(&mut files)?;
     let start = Instant::now();
     terrain.settle(&Asked::new(&args.raster, &args.places))?;
@@ -132,72 +180,138 @@ fn of_cells(
         terrain.grid(args.raster.crs.as_ref()),
         &terrain.heights.raster.values,
     );
-    let has_data = |cell: &usize| values[*cell].is_finite();
-    let cells: Vec<usize> = (0..values.len()).filter(has_data).collect();
-    let rise = args.places.placement.height / args.places.units.metres();
-    let observer = |&cell: &usize| Observer {
-        place: [cell % grid.width, cell / grid.width].map(|at| at as f64),
-        height: values[cell] + rise,
-        normal: [0.0; 3],
-    };
-    let observers: Vec<Observer> = cells.iter().map(observer).collect();
     // Clockwise from the north of the map.
     let north = args.places.north.degrees();
-    let turned: Vec<f64> = azimuths.iter().map(|azimuth| azimuth + north).collect();
-    let job = FieldHorizonJob::new(&field, &observers, &turned, 0.0)?;
-    let build_seconds = start.elapsed().as_secs_f64();
+    let (azimuths, directions) = match args.azimuths() {
+        Azimuths::Even(count) => {
+            let azimuths = args.degrees(count);
+            let of = |azimuth: &f64| Direction::new(&field, azimuth + north);
+            let directions: Vec<Direction> = azimuths.iter().map(of).collect();
+            (azimuths, directions)
+        }
+        Azimuths::Lattice(count) => {
+            let lattice = Lattice::new(&field, count).map_err(Failure::usage)?;
+            let azimuths = lattice.azimuths.into_iter();
+            let azimuths = azimuths.map(|azimuth| (azimuth - north).rem_euclid(360.0));
+            let directions = lattice.steps.into_iter().map(Direction::Step);
+            (azimuths.collect(), directions.collect())
+        }
+    };
+    let rise = args.places.placement.height / args.places.units.metres();
+    let job = FieldHorizonJob::new(&field, &directions, rise, 0.0)?;
+    let has_data = |cell: &usize| values[*cell].is_finite();
+    let horizon = Horizon {
+        name: &terrain.name,
+        azimuths: &azimuths,
+        number: (0..values.len()).filter(has_data).count(),
+        triangles: field.triangles(),
+        seconds: [terrain.load_seconds, start.elapsed().as_secs_f64()],
+    };
+    if let ([path], true) = (bake.outputs, bake.is_whole())
+        && has_planes(path)
+    {
+        return horizon.write_planes(bake, path, &grid, &job);
+    }
+    let cells: Vec<usize> = (0..values.len()).filter(has_data).collect();
     let local = terrain.local();
     let point = |&cell: &usize| {
         let [x, y] = grid.centre(cell % grid.width, cell / grid.width);
         local.local([x, y, values[cell]])
     };
-    let horizon = Horizon {
-        name: &terrain.name,
-        azimuths,
-        sensors: &Sensors {
-            points: cells.iter().map(point).collect(),
-            ..Sensors::default()
-        },
-        local,
-        triangles: field.triangles(),
-        seconds: [terrain.load_seconds, build_seconds],
-        done: bake.compute_cells(&job, &terrain.name)?,
+    let mut done = bake.compute_cells(&job, &terrain.name)?;
+    let planes = done.found.take();
+    // Of cells with data, all azimuths of one after the other.
+    let of_cell = |planes: &Vec<f32>| {
+        let angles =
+            |&cell: &usize| (0..azimuths.len()).map(move |at| planes[at * values.len() + cell]);
+        cells.iter().flat_map(angles).collect()
     };
-    horizon.write(bake, |path, angles| {
-        let all = RasterCells {
-            grid: grid.clone(),
-            cells: cells.iter().map(|&cell| cell as u32).collect(),
-        };
-        raster::write_cells(path, &all, angles, QUANTITY)
+    done.found = planes.as_ref().map(of_cell);
+    let sensors = Sensors {
+        points: cells.iter().map(point).collect(),
+        ..Sensors::default()
+    };
+    horizon.write(bake, (&sensors, local, &done), |path, _| {
+        let planes = planes.as_deref().unwrap_or_default();
+        raster::write_values(path, &grid, planes, QUANTITY)
     })?;
-    horizon.end(bake, || ())
+    horizon.end(bake, Sum::of(done.found.as_deref()), &done, || ())
 }
 
-/// Angles of sensors.
+/// Whether a file has all azimuths as planes of cells.
+fn has_planes(path: &Path) -> bool {
+    is_one_of(path, &["npy"])
+}
+
+/// A horizon of sensors in some azimuths.
 struct Horizon<'a> {
     /// Name of the scene.
     name: &'a str,
     azimuths: &'a [f64],
-    sensors: &'a Sensors,
-    local: LocalOrigin,
+    /// Number of sensors.
+    number: usize,
     triangles: usize,
     /// Seconds of loading and of building.
     seconds: [f64; 2],
-    done: Done<Vec<f32>>,
+}
+
+/// Sum and number of angles.
+#[derive(Clone, Copy, Default)]
+struct Sum(f64, u64);
+
+impl Sum {
+    /// Of these angles, but for unknown ones.
+    fn of(angles: Option<&[f32]>) -> Self {
+        let known = angles.unwrap_or_default().iter().filter(|x| !x.is_nan());
+        let add = |Self(sum, number): Self, &angle: &f32| Self(sum + f64::from(angle), number + 1);
+        known.fold(Self::default(), add)
+    }
 }
 
 impl Horizon<'_> {
-    /// Writes all outputs; `raster` those that are rasters.
+    /// Writes the planes of all azimuths as they come, and ends.
+    fn write_planes(
+        &self,
+        bake: &Bake<'_>,
+        path: &Path,
+        grid: &Grid,
+        job: &FieldHorizonJob<'_>,
+    ) -> Result<(), Failure> {
+        let (start, planes) = (Instant::now(), self.azimuths.len());
+        check_room(path, 4 * (planes * grid.width * grid.height) as u64)?;
+        let progress = Progress::new(self.name);
+        let (mut all, mut failure) = (Sum::default(), None);
+        let written = atomic_write(path, |file| {
+            antumbra_raster::write_planes(file, grid, planes, &mut |index| {
+                let plane = job.plane(index, &Planes(&progress, [index, planes]));
+                let plane = plane.map_err(|error| {
+                    failure = Some(error);
+                    io::Error::other("cancelled")
+                })?;
+                let Sum(sum, number) = Sum::of(Some(&plane));
+                all = Sum(all.0 + sum, all.1 + number);
+                Ok(plane)
+            })
+        });
+        progress.finish();
+        failure.map_or(Ok(()), |error| Err(Failure::from(error)))?;
+        written?;
+        let done = Done::whole((), start.elapsed().as_secs_f64());
+        self.end(bake, all, &done, || ())
+    }
+
+    /// Writes all outputs of angles; `raster` those that are rasters.
     fn write(
         &self,
         bake: &Bake<'_>,
+        (sensors, local, done): (&Sensors, LocalOrigin, &Done<Vec<f32>>),
         raster: impl Fn(&Path, &[f32]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let Some(angles) = &self.done.found else {
+        let Some(angles) = &done.found else {
             return Ok(());
         };
         let _writing = interrupt::writing();
-        let (width, sensors) = (self.azimuths.len(), self.sensors);
+        let width = self.azimuths.len();
         bake.outputs
             .iter()
             .try_for_each(|path| match Format::of_sensors(path)? {
@@ -213,13 +327,13 @@ impl Horizon<'_> {
                     };
                     let columns: Vec<Column<'_>> =
                         self.azimuths.iter().enumerate().map(column).collect();
-                    files::table(path, (sensors, &sensors.normals, self.local), &[], &columns)
+                    files::table(path, (sensors, &sensors.normals, local), &[], &columns)
                 }
                 Format::Npz => {
                     let entries = [
                         Entry::new("horizon", Array::F32(angles)).columns(width),
                         Entry::new("azimuths", Array::F64(self.azimuths)),
-                        Entry::new("points", Array::Places(&sensors.points, self.local)),
+                        Entry::new("points", Array::Places(&sensors.points, local)),
                     ];
                     files::npz(path, &entries)
                 }
@@ -228,36 +342,52 @@ impl Horizon<'_> {
     }
 
     /// Writes the document, and says what was done: first of the scene by `tell_scene`.
-    fn end(&self, bake: &Bake<'_>, tell_scene: impl Fn()) -> Result<(), Failure> {
-        let angles = self.done.found.as_deref().unwrap_or_default();
-        let known = || angles.iter().filter(|angle| !angle.is_nan());
-        let (sum, number) = (
-            known().map(|&angle| f64::from(angle)).sum::<f64>(),
-            known().count(),
-        );
+    fn end<T>(
+        &self,
+        bake: &Bake<'_>,
+        Sum(sum, number): Sum,
+        done: &Done<T>,
+        tell_scene: impl Fn(),
+    ) -> Result<(), Failure> {
         let mean = (number > 0).then(|| sum / number as f64);
         let figures: &[Figure<'_>] = &[
             ("outputs", &bake.output_names()),
             ("shard", &bake.shard()),
             ("triangles", &self.triangles),
-            ("sensors", &self.sensors.points.len()),
+            ("sensors", &self.number),
             ("azimuths", &self.azimuths),
             ("mean_degrees", &mean),
             ("load_seconds", &self.seconds[0]),
             ("build_seconds", &self.seconds[1]),
-            ("trace_seconds", &self.done.seconds),
+            ("trace_seconds", &done.seconds),
         ];
         let name = ("antumbra.horizon/1", self.name);
-        if bake.document(name, figures, (&self.done, ""))? {
+        if bake.document(name, figures, (done, ""))? {
             tell_scene();
             tell(format_args!(
                 "{} sensors, {} azimuths; the horizon is {:.2} degrees high on average",
-                count(self.sensors.points.len() as u64),
+                count(self.number as u64),
                 self.azimuths.len(),
                 mean.unwrap_or(f64::NAN),
             ));
-            bake.end("angles", angles.len() as u64, &self.done);
+            bake.end("angles", (self.number * self.azimuths.len()) as u64, done);
         }
         Ok(())
+    }
+}
+
+/// Progress of one of so many planes.
+struct Planes<'a>(&'a Progress, [usize; 2]);
+
+impl Monitor for Planes<'_> {
+    fn progress(&self, done: usize, total: usize) {
+        // Planes differ in what they count.
+        let Self(progress, [index, planes]) = self;
+        let part = 1000 * done / total.max(1);
+        Monitor::progress(*progress, 1000 * index + part, 1000 * planes);
+    }
+
+    fn cancelled(&self) -> bool {
+        Monitor::cancelled(self.0)
     }
 }

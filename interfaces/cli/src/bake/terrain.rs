@@ -57,11 +57,8 @@ impl Terrain {
     pub fn field(&self) -> Result<HeightField<'_>, Failure> {
         let raster = &self.heights.raster;
         let size = [raster.grid.width, raster.grid.height];
-        Ok(HeightField::new(
-            size,
-            &raster.values,
-            raster.grid.transform,
-        )?)
+        let field = HeightField::new(size, &raster.values, raster.grid.transform);
+        Ok(field.map_err(antumbra_bake::Error::from)?)
     }
 
     /// Origin of points in single precision.

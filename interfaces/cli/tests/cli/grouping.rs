@@ -579,6 +579,46 @@ fn horizons_by_rays_and_of_cells_agree_and_shares_change_no_byte() {
         .expect(0);
     let read = |name: &str| fs::read(place.path(name)).expect("a file");
     assert!(read("merged.npz") == read("cells.npz"));
+    // By default, cells have the azimuths of steps of at most two cells.
+    let lattice = ["horizon", "wall.asc", "--cells"];
+    let outputs = ["-o", "all.csv", "-o", "all.npy"];
+    place.run(&[&lattice[..], &outputs].concat()).expect(0);
+    let all = table(&place, "all.csv");
+    assert_eq!(all[0].len(), 3 + 16);
+    assert_eq!(
+        all[0][3..6].join(","),
+        "horizon_000,horizon_026.57,horizon_045"
+    );
+    for (own, even) in [(5, 4), (7, 5)] {
+        assert_eq!(all[1 + 20 * 40 + 20][own], row[even], "{}", all[0][own]);
+    }
+    let planes = fs::read(place.path("all.npy")).expect("planes");
+    assert!(String::from_utf8_lossy(&planes[..128]).contains("(16, 40, 40)"));
+    assert_eq!(planes.len(), 128 + 4 * 16 * 40 * 40);
+    for (flags, words) in [
+        (
+            &["--first", "3"][..],
+            "--first is for azimuths that are evenly spread",
+        ),
+        (
+            &["--azimuths", "lattice:9"],
+            "azimuths of a lattice: found 9, wanted 8, 16, 32",
+        ),
+        (
+            &["--azimuths", "lattice:8", "--grid", "2"],
+            "a lattice of azimuths is for --cells",
+        ),
+        (&["--azimuths", "0"], "wanted 1 to 3600, or lattice:8"),
+    ] {
+        let base = if flags.contains(&"--grid") {
+            &lattice[..2]
+        } else {
+            &lattice[..]
+        };
+        let run = place.run(&[base, flags, &["-o", "b.csv"]].concat());
+        let said = run.expect(2).stderr;
+        assert!(said.contains(words), "{said}");
+    }
     // A raster has one azimuth.
     place
         .run(&[&cells[..], &["-o", "a.tif"]].concat())

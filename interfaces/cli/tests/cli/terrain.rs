@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use antumbra_raster::{Crs, Grid, Quantity, Raster, read, write};
+use antumbra_raster::{Crs, Grid, Purpose, Quantity, Raster, read, write};
 
 use crate::support::Place;
 
@@ -35,7 +35,7 @@ fn place() -> Place {
 
 impl Place {
     fn raster(&self, name: &str) -> Raster {
-        read(&self.path(name), u64::MAX).expect("a raster")
+        read(&self.path(name), u64::MAX, Purpose::Values).expect("a raster")
     }
 }
 

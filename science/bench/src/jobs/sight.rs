@@ -1,7 +1,7 @@
 //! Visibility between points, and of a terrain from one point. Ours does the second without a mesh or a tree.
 
 use antumbra::{Bvh, Ray, Recipe};
-use antumbra_bake::{HeightField, Observer, ViewshedJob, sees_each_other};
+use antumbra_bake::{HeightField, Limits, Observer, ViewshedJob, sees_each_other};
 use antumbra_lab::embree::{Call, Scene, SceneFlags};
 use antumbra_lab::harness::{Mesh, dot, less};
 use antumbra_testkit::Rng;
@@ -84,13 +84,11 @@ pub fn viewshed(job: &mut Job, side: u32) -> Outcome {
             height,
             normal: [0.0; 3],
         }];
-        let job = ViewshedJob {
-            field,
-            observers: &observers,
+        let limits = Limits {
             target: 1.0,
-            drop: 0.0,
-            range: f64::INFINITY,
+            ..Limits::default()
         };
+        let job = ViewshedJob::new(field, &observers, limits).expect("memory for heights");
         let nothing = Bvh::build(&[], &Recipe::default()).expect("an empty tree");
         let found = antumbra_bake::run(&job, &nothing, &()).expect("memory for runs");
         let mut seen = vec![0u64; heights.len().div_ceil(64)];

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use antumbra_bake::{
-    Curvature, HeightField, Mesh, Observer, Orientation, Sensors, ViewshedJob, Viewsheds,
+    Curvature, HeightField, Limits, Mesh, Observer, Orientation, Sensors, ViewshedJob, Viewsheds,
 };
 use antumbra_lab::count;
 
@@ -33,18 +33,17 @@ pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), 
     let field = terrain.field()?;
     let build_seconds = start.elapsed().as_secs_f64();
     let table = Table::read(args, &field, &terrain)?;
-    let job = ViewshedJob {
-        field: &field,
-        observers: &table.observers,
+    let limits = Limits {
         target: args.target,
         drop: drop(args)?,
         range: args.radius.unwrap_or(f64::INFINITY),
     };
+    let job = ViewshedJob::new(&field, &table.observers, limits)?;
     let of = table.observers.len();
     let buried = table
         .observers
         .iter()
-        .filter(|eye| job.is_buried(eye))
+        .filter(|eye| field.buries(eye))
         .count();
     if buried > 0 {
         tell(format_args!(

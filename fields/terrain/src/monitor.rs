@@ -20,18 +20,20 @@ pub trait Monitor: Sync {
 impl Monitor for () {}
 
 /// Counts the items that are done for a monitor.
-pub(crate) struct Progress<'a> {
+pub struct Progress<'a> {
     monitor: &'a dyn Monitor,
     done: AtomicUsize,
     of: usize,
 }
 
 impl<'a> Progress<'a> {
+    /// A counter of so many items.
     pub fn new(monitor: &'a dyn Monitor, of: usize) -> Self {
         let done = AtomicUsize::new(0);
         Self { monitor, done, of }
     }
 
+    /// Adds items that are done.
     pub fn add(&self, items: usize) {
         let before = self.done.fetch_add(items, Ordering::Relaxed);
         self.monitor.progress(before + items, self.of);

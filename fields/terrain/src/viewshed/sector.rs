@@ -1,6 +1,6 @@
 //! The sweep of a viewshed: a sector of the plan, line by line, from near to far.
 //!
-//! A [horizon](crate::rasters::horizon) has all edges that the sweep has passed. A cell of a line is seen if the line of sight to it ends above
+//! A [horizon](super::envelope) has all edges that the sweep has passed. A cell of a line is seen if the line of sight to it ends above
 //! the horizon. So each edge is projected once, and the work grows with the number of cells.
 //!
 //! # Blocks that are left out
@@ -13,8 +13,10 @@
 
 use std::ops::Range;
 
-use crate::rasters::height_field::{HeightField, Observer, Side, View};
-use crate::rasters::horizon::{Edge, Horizon, Point};
+use super::Limits;
+use super::envelope::{Edge, Horizon, Point};
+use super::view::{Side, Turned, View};
+use crate::Observer;
 
 /// Sectors of a side. They are the same for any number of threads, and so are all bits.
 pub const SECTORS: usize = 4;
@@ -33,14 +35,6 @@ const FAR: f64 = 8.0;
 
 /// Cells of a line.
 pub type Run = (u32, Range<u32>);
-
-/// What counts as seen, as [`ViewshedJob`](crate::ViewshedJob) says.
-#[derive(Clone, Copy)]
-pub struct Limits {
-    pub target: f64,
-    pub drop: f64,
-    pub range: f64,
-}
 
 /// A part of the plan that is swept.
 pub struct Sector<'a> {
@@ -82,18 +76,18 @@ impl Cells {
 
 impl<'a> Sector<'a> {
     pub fn new(
-        field: &'a HeightField<'_>,
+        turned: &'a Turned<'_>,
         observer: &Observer,
-        limits: Limits,
+        limits: &Limits,
         side: Side,
         index: usize,
     ) -> Self {
         let end = |index: usize| 2.0 * index as f64 / SECTORS as f64 - 1.0;
         Self {
-            view: field.view(side, observer.place),
+            view: turned.view(side, observer.place),
             height: observer.height,
-            scale: 1.0 / field.unit(),
-            target: limits.target / field.unit(),
+            scale: 1.0 / turned.field().unit(),
+            target: limits.target / turned.field().unit(),
             drop: limits.drop,
             range: limits.range,
             ends: [end(index), end(index + 1)],
@@ -423,8 +417,9 @@ mod tests {
                     }
                 })
                 .collect();
-            let field = HeightField::new(size, &heights, [0.0, 1.0, 0.2, 0.0, 0.0, -1.5]);
+            let field = crate::HeightField::new(size, &heights, [0.0, 1.0, 0.2, 0.0, 0.0, -1.5]);
             let field = field.expect("a field");
+            let turned = Turned::new(&field).expect("memory");
             let limits = Limits {
                 target: if seed % 2 == 0 { 0.0 } else { 1.0 },
                 drop: 1e-4 * random(),
@@ -439,7 +434,7 @@ mod tests {
                 };
                 for side in Side::ALL {
                     for index in 0..SECTORS {
-                        let mut sector = Sector::new(&field, &observer, limits, side, index);
+                        let mut sector = Sector::new(&turned, &observer, &limits, side, index);
                         let found = sector.sweep();
                         sector.far = f64::INFINITY;
                         let all = sector.sweep();

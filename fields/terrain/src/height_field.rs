@@ -1,11 +1,10 @@
 //! Height fields: heights in the cells of a raster, as the surface of triangles that its mesh has.
 
 use std::collections::HashSet;
-use std::ops::Range;
 
-use crate::{Error, memory};
+use crate::Error;
 
-/// Heights of the cells of a raster, row by row, for viewsheds without a tree.
+/// Heights of the cells of a raster, row by row.
 ///
 /// The surface has a vertex at the centre of each cell with data. Each square between four centres is two triangles, which share
 /// the diagonal from the first to the last of them. A square with three centres is one triangle, one with fewer is a hole.
@@ -16,12 +15,9 @@ pub struct HeightField<'a> {
     width: usize,
     height: usize,
     rows: &'a [f64],
-    /// Heights column by column: a transposed copy of `rows`.
-    columns: Vec<f64>,
-    /// Tops of rows and of columns: see [`tops`].
-    tops: [Vec<f64>; 2],
     transform: [f64; 6],
     wires: HashSet<Wire>,
+    has_holes: bool,
 }
 
 /// An observer on a height field.
@@ -37,25 +33,22 @@ pub struct Observer {
 
 impl Observer {
     /// Whether the observer has a place and a height.
-    pub(crate) fn is_finite(&self) -> bool {
+    pub fn is_finite(&self) -> bool {
         let [x, y] = self.place;
         [x, y, self.height].iter().all(|x| x.is_finite())
     }
 }
 
 /// Two cells that are neighbours in a row or a column, the first one first: an edge of no triangle.
-type Wire = [u32; 2];
-
-/// Cells that are turned at a time, so that rows and columns stay in the cache.
-const TILE: usize = 32;
+pub(crate) type Wire = [usize; 2];
 
 impl<'a> HeightField<'a> {
     /// Heights of `width * height` cells; NaN where there is no data. `transform` gives map coordinates of corners of cells, in the
     /// order of GDAL: `x = t[0] + c t[1] + r t[2]` and `y = t[3] + c t[4] + r t[5]`.
     ///
     /// # Errors
-    /// [`Error::Length`] if there are not as many heights as cells, [`Error::Range`] if cells have no size or their number is not
-    /// within 1 to 2³² - 1, [`Error::NoMemory`].
+    /// [`Error::Length`] if there are not as many heights as cells, [`Error::Range`] if there are no cells, they have no size, or a
+    /// height is infinite.
     pub fn new(
         [width, height]: [usize; 2],
         heights: &'a [f64],
@@ -67,29 +60,23 @@ impl<'a> HeightField<'a> {
         Error::check_range("area of a cell", area, is_in, "a number above 0")?;
         let cells = width.saturating_mul(height);
         Error::check_length("heights", heights.len(), cells)?;
-        let is_in = (1..=u32::MAX as usize).contains(&cells);
-        Error::check_range("number of cells", cells as f64, is_in, "1 to 4294967295")?;
-        let mut columns = memory::filled("heights", heights.len(), 0.0)?;
-        for top in (0..height).step_by(TILE) {
-            for left in (0..width).step_by(TILE) {
-                for column in left..(left + TILE).min(width) {
-                    for row in top..(top + TILE).min(height) {
-                        columns[column * height + row] = heights[row * width + column];
-                    }
-                }
-            }
-        }
-        let tops = [tops(heights, width)?, tops(&columns, height)?];
+        Error::check_range("number of cells", cells as f64, cells > 0, "at least 1")?;
+        let endless = heights.iter().find(|height| height.is_infinite());
+        let wanted = "finite heights, or NaN where there is no data";
+        let height_found = endless.copied().unwrap_or_default();
+        Error::check_range("height", height_found, endless.is_none(), wanted)?;
         let mut field = Self {
-            tops,
             width,
             height,
             rows: heights,
-            columns,
             transform,
             wires: HashSet::new(),
+            // A single row has no triangle, so that none of its edges counts.
+            has_holes: width < 2 || height < 2 || heights.iter().any(|height| !height.is_finite()),
         };
-        field.find_wires();
+        if field.has_holes {
+            field.find_wires();
+        }
         Ok(field)
     }
 
@@ -99,9 +86,6 @@ impl<'a> HeightField<'a> {
             let is_inside = column < self.width && row < self.height;
             is_inside && self.rows[row * self.width + column].is_finite()
         };
-        if self.rows.iter().all(|height| height.is_finite()) {
-            return;
-        }
         for (cell, height) in self.rows.iter().enumerate() {
             let [column, row] = [cell % self.width, cell / self.width];
             if !height.is_finite() {
@@ -118,11 +102,11 @@ impl<'a> HeightField<'a> {
                 (right, below),
             ];
             if has(right, row) && !any(beside_row) {
-                self.wires.insert([cell as u32, cell as u32 + 1]);
+                self.wires.insert([cell, cell + 1]);
             }
             let beside_column = [(before, row), (before, below), (right, row), (right, below)];
             if has(column, below) && !any(beside_column) {
-                self.wires.insert([cell as u32, (cell + self.width) as u32]);
+                self.wires.insert([cell, cell + self.width]);
             }
         }
     }
@@ -142,14 +126,24 @@ impl<'a> HeightField<'a> {
         self.transform
     }
 
+    /// Whether cells have no data, or belong to no triangle.
+    pub fn has_holes(&self) -> bool {
+        self.has_holes
+    }
+
+    /// Neighbours with data that belong to no triangle, the first one first.
+    pub(crate) fn wires(&self) -> &HashSet<Wire> {
+        &self.wires
+    }
+
     /// Way to the east and to the north of so many columns and rows.
-    pub(crate) fn along(&self, [columns, rows]: [f64; 2]) -> [f64; 2] {
+    pub fn along(&self, [columns, rows]: [f64; 2]) -> [f64; 2] {
         let [_, a, b, _, d, e] = self.transform;
         [a * columns + b * rows, d * columns + e * rows]
     }
 
     /// Whether the eye of an observer is below the surface.
-    pub(crate) fn buries(&self, observer: &Observer) -> bool {
+    pub fn buries(&self, observer: &Observer) -> bool {
         let surface = self.surface(observer.place);
         surface.is_some_and(|surface| surface - observer.height > 1e-9 * self.unit())
     }
@@ -229,7 +223,7 @@ impl<'a> HeightField<'a> {
             (true, true) if (c < c2) == (r < r2) => beside.0 || beside.1,
             (true, true) => beside.0 != beside.1,
             _ => {
-                let cell = |column: f64, row: f64| row as u32 * self.width as u32 + column as u32;
+                let cell = |column: f64, row: f64| row as usize * self.width + column as usize;
                 let mut wire = [cell(c, r), cell(c2, r2)];
                 wire.sort_unstable();
                 !self.wires.contains(&wire)
@@ -243,188 +237,23 @@ impl<'a> HeightField<'a> {
         let mut beside = beside.into_iter();
         beside.any(|other| self.height_at(other).is_some() && self.has_edge([c, r], other))
     }
-
-    /// The field as it looks from a cell: along columns or rows, forwards or backwards.
-    pub(crate) fn view(&self, side: Side, [column, row]: [f64; 2]) -> View<'_> {
-        let [_, a, b, _, d, e] = self.transform;
-        let metric = [a * a + d * d, a * b + d * e, b * b + e * e];
-        let is_east_west = matches!(side, Side::East | Side::West);
-        let [xx, xy, yy] = metric;
-        let tops = &self.tops[usize::from(is_east_west)][..];
-        let (heights, size, at, metric) = match is_east_west {
-            true => (
-                &self.columns[..],
-                [self.width, self.height],
-                [column, row],
-                [xx, xy, yy],
-            ),
-            false => (
-                self.rows,
-                [self.height, self.width],
-                [row, column],
-                [yy, xy, xx],
-            ),
-        };
-        let is_turned = matches!(side, Side::West | Side::North);
-        let last = size.map(|size| size as f64 - 1.0);
-        View {
-            heights,
-            lines: size[0],
-            length: size[1],
-            eye: match is_turned {
-                true => [last[0] - at[0], last[1] - at[1]],
-                false => at,
-            },
-            metric,
-            is_turned,
-            is_east_west,
-            tops,
-            wires: &self.wires,
-        }
-    }
 }
 
-/// Cells of a block of a line.
-const BLOCK: usize = 32;
+/// Numbers `a`, `b` of a family of lines, on which `a c + b r` of column `c` and row `r` is a whole number, and the step from cell to
+/// cell of such a line.
+pub(crate) type Family = ([isize; 2], [isize; 2]);
 
-/// Cells on both sides of a block that its top counts: those that edges of the block may end at.
-const MARGIN: usize = 2;
-
-/// Largest height in each block of each line, and in the cells beside it.
-fn tops(heights: &[f64], length: usize) -> Result<Vec<f64>, Error> {
-    let mut tops = Vec::new();
-    for line in heights.chunks_exact(length) {
-        memory::grow(&mut tops, "heights", length.div_ceil(BLOCK))?;
-        tops.extend((0..length).step_by(BLOCK).map(|first| {
-            let cells = first.saturating_sub(MARGIN)..(first + BLOCK + MARGIN).min(length);
-            let known = line[cells]
-                .iter()
-                .copied()
-                .filter(|height| height.is_finite());
-            known.fold(f64::NEG_INFINITY, f64::max)
-        }));
-    }
-    Ok(tops)
+/// Families of lines that have all edges: columns, rows, diagonals of squares, and the other ones, which only squares with three
+/// corners have.
+pub(crate) fn families(has_holes: bool) -> &'static [Family] {
+    const ALL: [Family; 4] = [
+        ([1, 0], [0, 1]),
+        ([0, 1], [1, 0]),
+        ([1, -1], [1, 1]),
+        ([1, 1], [1, -1]),
+    ];
+    &ALL[..if has_holes { 4 } else { 3 }]
 }
 
 /// Millionths of a cell, as a power of two.
 const MILLION: f64 = (1 << 20) as f64;
-
-/// A quarter of the plan around an eye.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Side {
-    East,
-    South,
-    West,
-    North,
-}
-
-impl Side {
-    pub const ALL: [Self; 4] = [Self::East, Self::South, Self::West, Self::North];
-}
-
-/// A field that an eye looks along: lines are ahead one behind another, and the cells of each line from side to side. Diagonals go
-/// from a cell to the next one of the next line.
-pub(crate) struct View<'a> {
-    heights: &'a [f64],
-    pub lines: usize,
-    pub length: usize,
-    /// Line of the eye, and its place there.
-    pub eye: [f64; 2],
-    /// Products of the steps to the next line and to the next cell: squared lengths of plans are `xx x² + 2 xy x y + yy y²`.
-    pub metric: [f64; 3],
-    is_turned: bool,
-    is_east_west: bool,
-    tops: &'a [f64],
-    wires: &'a HashSet<Wire>,
-}
-
-impl View<'_> {
-    /// Height of a cell.
-    #[inline]
-    pub fn height(&self, line: usize, at: usize) -> f64 {
-        self.heights[self.index(line, at)]
-    }
-
-    #[inline]
-    fn index(&self, line: usize, at: usize) -> usize {
-        let index = line * self.length + at;
-        match self.is_turned {
-            true => self.heights.len() - 1 - index,
-            false => index,
-        }
-    }
-
-    /// Number of blocks of a line.
-    fn blocks(&self) -> usize {
-        self.length.div_ceil(BLOCK)
-    }
-
-    /// Place of the first block, which may be before the first cell.
-    fn first_block(&self) -> isize {
-        match self.is_turned {
-            true => self.length as isize - (BLOCK * self.blocks()) as isize,
-            false => 0,
-        }
-    }
-
-    /// Block of a cell of a line.
-    pub fn block(&self, at: usize) -> usize {
-        (at as isize - self.first_block()) as usize / BLOCK
-    }
-
-    /// Cells of a block.
-    pub fn cells(&self, block: usize) -> Range<usize> {
-        let first = (BLOCK * block) as isize + self.first_block();
-        first.max(0) as usize..((first + BLOCK as isize) as usize).min(self.length)
-    }
-
-    /// Largest height in a block of a line, and in the two cells on both sides of it.
-    pub fn top(&self, line: usize, block: usize) -> f64 {
-        let index = line * self.blocks() + block;
-        match self.is_turned {
-            true => self.tops[self.tops.len() - 1 - index],
-            false => self.tops[index],
-        }
-    }
-
-    /// Number of a cell in the rows of the raster.
-    #[inline]
-    pub fn cell(&self, line: usize, at: usize) -> usize {
-        let index = self.index(line, at);
-        match self.is_east_west {
-            true => index % self.length * self.lines + index / self.length,
-            false => index,
-        }
-    }
-
-    /// Whether two neighbours with data belong to a triangle.
-    #[inline]
-    pub fn is_joined(&self, a: [usize; 2], b: [usize; 2]) -> bool {
-        if self.wires.is_empty() {
-            return true;
-        }
-        let mut wire = [a, b].map(|[line, at]| self.cell(line, at) as u32);
-        wire.sort_unstable();
-        !self.wires.contains(&wire)
-    }
-
-    /// Squared length in plan from the eye.
-    #[inline]
-    pub fn squared(&self, x: f64, y: f64) -> f64 {
-        let [xx, xy, yy] = self.metric;
-        xx * x * x + 2.0 * xy * x * y + yy * y * y
-    }
-
-    /// Least squared length in plan to a place so many lines ahead.
-    pub fn least_squared(&self, x: f64) -> f64 {
-        let [xx, xy, yy] = self.metric;
-        x * x * (xx - xy * xy / yy)
-    }
-
-    /// Distance ahead, in lines, from which on all places are farther than a length in plan.
-    pub fn most_lines(&self, length: f64) -> f64 {
-        let [xx, xy, yy] = self.metric;
-        length * (yy / (xx * yy - xy * xy)).sqrt()
-    }
-}
