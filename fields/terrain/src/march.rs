@@ -469,7 +469,8 @@ impl Square<'_> {
             };
             let lower = self.march.drop * crossing.distance;
             let slope = crossing.slope([a, b], self.eyes[row][lane]) - lower;
-            if slope > self.most[row][lane] && is_edge(field, ends) {
+            let is_higher = slope > self.most[row][lane];
+            if is_higher && (!field.has_holes() || is_edge(field, ends)) {
                 self.most[row][lane] = slope;
             }
         }

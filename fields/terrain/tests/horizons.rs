@@ -258,6 +258,37 @@ fn parts_of_a_raster_have_the_bits_of_the_whole() {
     }
 }
 
+/// More lines than are walked side by side, by one thread: those that it walked before leave nothing behind.
+#[test]
+fn columns_of_a_wide_raster_do_not_meet() {
+    let thread = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let thread = thread.expect("a thread");
+    for holes in [0.0, 0.1] {
+        let heights = hills([1300, 12], holes, 7);
+        let found = |width: usize, heights: &[f64]| {
+            let field = HeightField::new([width, 12], heights, PLAIN).expect("a field");
+            let sweep = Sweep {
+                field: &field,
+                rise: 0.0,
+                drop: 0.0,
+            };
+            let found = thread.install(|| sweep.horizons([0, -1], degrees, &()));
+            found.expect("horizons")
+        };
+        let whole = found(1300, &heights);
+        // Columns whose neighbours on both sides are in the part.
+        for first in (0..1290).step_by(8) {
+            let part = heights.chunks(1300).flat_map(|row| &row[first..first + 10]);
+            let part = found(10, &part.copied().collect::<Vec<_>>());
+            for (row, angles) in part.chunks(10).enumerate() {
+                let own = &whole[1300 * row + first..][..10];
+                let bits = |angles: &[f32]| [1, 2, 3, 4, 5, 6, 7, 8].map(|at| angles[at].to_bits());
+                assert_eq!(bits(angles), bits(own), "row {row} from column {first}");
+            }
+        }
+    }
+}
+
 #[test]
 fn the_sea_dips_below_the_level() {
     let size = [1601, 401];

@@ -14,9 +14,10 @@
 //!
 //! The surface along a line is straight between its crossings with edges of triangles, so the hull takes the crossings with rows,
 //! columns and diagonals besides the cells: all that there is. Heights are multiplied by a whole number, such that crossings divide
-//! edges into whole parts, and distances are whole numbers of parts of a step. So for heights in single precision all sums and
-//! products are exact, and a slope is rounded once. It depends on nothing but the heights ahead: neither on where the raster lies nor
-//! on how it is divided.
+//! edges into whole parts, and distances are whole numbers of parts of a step. So nothing depends on where the raster lies. Sums and
+//! products are exact as long as their digits fit into double precision, for example for heights
+//! in single precision between 256 and 4096, and then a slope is rounded once. Otherwise two points of nearly the same slope may be confused,
+//! and the horizon is right to some units in its last place.
 //!
 //! Over a round earth places lose height with the squared distance from the observer. As each observer compares points by differences
 //! of distances only, the same hull serves: see `hides` in `hulls`.

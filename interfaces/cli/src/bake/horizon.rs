@@ -88,13 +88,27 @@ impl Azimuths {
 }
 
 impl HorizonArgs {
+    /// Whether sensors are the cells of a height raster.
+    fn is_of_cells(&self) -> bool {
+        self.places.vertices && is_terrain(&self.scene, self.places.up)
+    }
+
     /// How azimuths are chosen.
     fn azimuths(&self) -> Azimuths {
-        let of_cells = || self.places.vertices && is_terrain(&self.scene, self.places.up);
-        self.azimuths.unwrap_or_else(|| match of_cells() {
+        self.azimuths.unwrap_or_else(|| match self.is_of_cells() {
             true => Azimuths::Lattice(16),
             false => Azimuths::Even(36),
         })
+    }
+
+    /// Number of azimuths that are evenly spread.
+    fn even(&self) -> Result<u32, Failure> {
+        match self.azimuths() {
+            Azimuths::Even(count) => Ok(count),
+            Azimuths::Lattice(_) => Err(Failure::Usage(
+                "a lattice of azimuths is for --cells of a height raster".into(),
+            )),
+        }
     }
 
     /// Degrees of `count` azimuths from north through east, from 0 to 360.
@@ -120,16 +134,12 @@ impl Baking for HorizonArgs {
                 return Err(Failure::name(path, reason));
             }
         }
-        if matches!(self.azimuths(), Azimuths::Lattice(_)) {
-            if !(self.places.vertices && is_terrain(&self.scene, self.places.up)) {
-                let reason = "a lattice of azimuths is for --cells of a height raster";
-                return Err(Failure::Usage(reason.into()));
-            }
-            if self.first != 0.0 {
-                let reason =
-                    "--first is for azimuths that are evenly spread, and a lattice has its own";
-                return Err(Failure::Usage(reason.into()));
-            }
+        if !self.is_of_cells() {
+            self.even()?;
+        } else if self.first != 0.0 && self.even().is_err() {
+            let reason =
+                "--first is for azimuths that are evenly spread, and a lattice has its own";
+            return Err(Failure::Usage(reason.into()));
         }
         places::check(&self.places)
     }
@@ -139,13 +149,10 @@ impl Baking for HorizonArgs {
     }
 
     fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
-        if self.places.vertices && is_terrain(&self.scene, self.places.up) {
+        if self.is_of_cells() {
             return of_cells(self, bake, files);
         }
-        let Azimuths::Even(count) = self.azimuths() else {
-            return Err(Failure::Usage("a lattice is for cells of a raster".into()));
-        };
-        let azimuths = self.degrees(count);
+        let azimuths = self.degrees(self.even()?);
         let mut ground = bake.ground(&mut files, None)?;
         let up = ground.up(self.places.up)?;
         Asked::new(&self.raster, &self.places).of(&ground.loaded, up)?;

@@ -1,4 +1,4 @@
-//! Results by object, material and facade; elevations, moving shadows, horizons and view factors.
+//! Results by object, material and facade; elevations, moving shadows and view factors.
 
 use std::fs;
 
@@ -42,12 +42,6 @@ const DAY: [&str; 12] = [
     "30",
 ];
 
-fn table(place: &Place, name: &str) -> Vec<Vec<String>> {
-    let text = fs::read_to_string(place.path(name)).expect("a table");
-    let fields = |line: &str| line.split(',').map(str::to_owned).collect();
-    text.lines().map(fields).collect()
-}
-
 #[test]
 fn facades_and_materials_have_areas_and_means() {
     let place = village();
@@ -70,7 +64,7 @@ fn facades_and_materials_have_areas_and_means() {
         "sun.json",
     ];
     place.run(&[&flags[..], &facades, &DAY].concat()).expect(0);
-    let rows = table(&place, "facades.csv");
+    let rows = place.rows("facades.csv");
     let head = "object,facade,area_m2,sensors,hours_mean,hours_min,hours_max,sky_view_mean,sky_view_min,sky_view_max";
     assert_eq!(rows[0].join(","), head);
     // The ground below the houses is covered.
@@ -97,7 +91,7 @@ fn facades_and_materials_have_areas_and_means() {
     // The same lines as JSON, and means that the sensors give.
     let document = place.json("sun.json");
     assert_eq!(document["groups"][3]["facade"], "S");
-    let sensors = table(&place, "sun.csv");
+    let sensors = place.rows("sun.csv");
     let at = |name: &str| {
         sensors[0]
             .iter()
@@ -188,7 +182,7 @@ fn walls_that_touch_count_for_their_own_house_and_only_where_they_are_free() {
             run.stderr
         );
         assert!(!run.stderr.contains("warning"), "{}", run.stderr);
-        let rows = table(&place, "facades.csv");
+        let rows = place.rows("facades.csv");
         let named = |name: &str| {
             rows.iter()
                 .find(|row| row[..2].join(" ") == name)
@@ -205,7 +199,7 @@ fn walls_that_touch_count_for_their_own_house_and_only_where_they_are_free() {
             assert_eq!(named(name)[2], area, "{name}");
         }
         // Means of the sensors above the roof of the lower house.
-        let sensors = table(&place, "all.csv");
+        let sensors = place.rows("all.csv");
         let number = |row: &[String], column: usize| row[column].parse::<f64>().expect("a number");
         let is_west = |row: &&Vec<String>| number(row, 1) == 10.0 && number(row, 4) == -1.0;
         let own: Vec<f64> = sensors[1..]
@@ -252,7 +246,7 @@ fn points_inside_of_houses_or_between_two_are_told() {
         "normals decide: {}",
         run.stderr
     );
-    let rows = table(&place, "facades.csv");
+    let rows = place.rows("facades.csv");
     let counts: Vec<&str> = rows[1..]
         .iter()
         .filter(|row| row[3] != "0")
@@ -310,7 +304,7 @@ fn energies_are_means_times_areas() {
     place
         .run(&[&flags[..], &["--groups", "objects.csv"]].concat())
         .expect(0);
-    let rows = table(&place, "objects.csv");
+    let rows = place.rows("objects.csv");
     let at = |name: &str| {
         rows[0]
             .iter()
@@ -351,7 +345,8 @@ fn names_are_only_read() {
     let flags = ["sun", "a\u{1b}[31m.obj", "-o", "sun.csv", "--surfaces", "2"];
     let groups = ["--groups", "objects.csv", "--by", "object"];
     let ran = place.run(&[&flags[..], &groups, &DAY].concat()).expect(0);
-    let names: Vec<String> = table(&place, "objects.csv")
+    let names: Vec<String> = place
+        .rows("objects.csv")
         .into_iter()
         .map(|mut row| row.swap_remove(0))
         .collect();
@@ -415,7 +410,7 @@ fn elevations_show_one_side_of_one_object() {
         "640x480",
     ];
     place.run(&[&flags[..], &outputs, &DAY].concat()).expect(0);
-    let rows = table(&place, "south.csv");
+    let rows = place.rows("south.csv");
     let column = |name: &str| {
         rows[0]
             .iter()
@@ -452,7 +447,7 @@ fn elevations_show_one_side_of_one_object() {
         "roof.csv",
     ];
     place.run(&[&above[..], &DAY].concat()).expect(0);
-    assert_eq!(table(&place, "roof.csv").len(), 1 + 100);
+    assert_eq!(place.rows("roof.csv").len(), 1 + 100);
 }
 
 #[test]
@@ -523,121 +518,6 @@ fn shadows_move_in_one_file_or_in_many() {
 }
 
 #[test]
-fn horizons_by_rays_and_of_cells_agree_and_shares_change_no_byte() {
-    let place = Place::empty();
-    // A wall of 9 m along the east of a plain of 40 x 40 cells of 1 m.
-    let mut asc =
-        String::from("ncols 40\nnrows 40\nxllcorner 600000\nyllcorner 5340000\ncellsize 1\n");
-    for _ in 0..40 {
-        let row: Vec<&str> = (0..40)
-            .map(|column| if column == 35 { "9" } else { "0" })
-            .collect();
-        asc += &(row.join(" ") + "\n");
-    }
-    place.write("wall.asc", asc);
-    let flags = ["horizon", "wall.asc", "--azimuths", "8"];
-    let cells = [&flags[..], &["--cells"]].concat();
-    place
-        .run(&[&cells[..], &["-o", "cells.csv", "-o", "cells.npz"]].concat())
-        .expect(0);
-    let rows = table(&place, "cells.csv");
-    let names = "x,y,z,horizon_000,horizon_045,horizon_090,horizon_135,horizon_180,horizon_225,horizon_270,horizon_315";
-    assert_eq!(rows[0].join(","), names);
-    let row = &rows[1 + 20 * 40 + 20];
-    let number = |column: usize| row[column].parse::<f64>().expect("a number");
-    assert_eq!([number(0), number(1)], [600_020.5, 5_340_019.5]);
-    // The crest is 15 m away.
-    for (column, distance) in [(5, 15.0), (4, 15.0 * 2_f64.sqrt())] {
-        let wanted = (9.0 / distance).atan().to_degrees();
-        assert!(
-            (number(column) - wanted).abs() < 1e-3,
-            "{} for {wanted}",
-            number(column)
-        );
-    }
-    assert_eq!([number(3), number(9)], [0.0, 0.0]);
-    place.write("eye.csv", "x,y,z,nx,ny,nz\n600020.5,5340019.5,0,0,0,1\n");
-    let sensors = [&flags[..], &["--sensors", "eye.csv", "-o", "eye.csv.csv"]].concat();
-    place.run(&sensors).expect(0);
-    let by_rays = &table(&place, "eye.csv.csv")[1];
-    for column in 3..11 {
-        let own = by_rays[column + 3].parse::<f64>().expect("a number");
-        assert!(
-            (own - number(column)).abs() < 2e-3,
-            "{own} {}",
-            number(column)
-        );
-    }
-    for share in ["0/3", "1/3", "2/3"] {
-        let part = format!("{}.part", &share[..1]);
-        place
-            .run(&[&cells[..], &["--shard", share, "-o", &part]].concat())
-            .expect(0);
-    }
-    place
-        .run(&["merge", "0.part", "1.part", "2.part", "-o", "merged.npz"])
-        .expect(0);
-    let read = |name: &str| fs::read(place.path(name)).expect("a file");
-    assert!(read("merged.npz") == read("cells.npz"));
-    // By default, cells have the azimuths of steps of at most two cells.
-    let lattice = ["horizon", "wall.asc", "--cells"];
-    let outputs = ["-o", "all.csv", "-o", "all.npy"];
-    place.run(&[&lattice[..], &outputs].concat()).expect(0);
-    let all = table(&place, "all.csv");
-    assert_eq!(all[0].len(), 3 + 16);
-    assert_eq!(
-        all[0][3..6].join(","),
-        "horizon_000,horizon_026.57,horizon_045"
-    );
-    for (own, even) in [(5, 4), (7, 5)] {
-        assert_eq!(all[1 + 20 * 40 + 20][own], row[even], "{}", all[0][own]);
-    }
-    let planes = fs::read(place.path("all.npy")).expect("planes");
-    assert!(String::from_utf8_lossy(&planes[..128]).contains("(16, 40, 40)"));
-    assert_eq!(planes.len(), 128 + 4 * 16 * 40 * 40);
-    for (flags, words) in [
-        (
-            &["--first", "3"][..],
-            "--first is for azimuths that are evenly spread",
-        ),
-        (
-            &["--azimuths", "lattice:9"],
-            "azimuths of a lattice: found 9, wanted 8, 16, 32",
-        ),
-        (
-            &["--azimuths", "lattice:8", "--grid", "2"],
-            "a lattice of azimuths is for --cells",
-        ),
-        (&["--azimuths", "0"], "wanted 1 to 3600, or lattice:8"),
-    ] {
-        let base = if flags.contains(&"--grid") {
-            &lattice[..2]
-        } else {
-            &lattice[..]
-        };
-        let run = place.run(&[base, flags, &["-o", "b.csv"]].concat());
-        let said = run.expect(2).stderr;
-        assert!(said.contains(words), "{said}");
-    }
-    // A raster has one azimuth.
-    place
-        .run(&[&cells[..], &["-o", "a.tif"]].concat())
-        .expect(2);
-    let one = [
-        "horizon",
-        "wall.asc",
-        "--cells",
-        "--azimuths",
-        "1",
-        "--first",
-        "90",
-        "-o",
-        "east.tif",
-    ];
-    place.run(&one).expect(0);
-}
-
-#[test]
 fn view_factors_of_a_box_are_those_of_the_catalogue() {
     let place = Place::empty();
     let mut text = String::new();
@@ -662,7 +542,7 @@ fn view_factors_of_a_box_are_those_of_the_catalogue() {
     place
         .run(&[&flags[..], &["-o", "factors.csv", "-o", "factors.npz"]].concat())
         .expect(0);
-    let rows = table(&place, "factors.csv");
+    let rows = place.rows("factors.csv");
     let names = "object,area,to floor,to ceiling,to south,to east,to north,to west,to nowhere";
     assert_eq!(rows[0].join(","), names);
     let number = |row: usize, column: usize| rows[row][column].parse::<f64>().expect("a number");
@@ -714,6 +594,6 @@ fn mirrored_surfaces_face_as_their_normals() {
         let flags = ["factors", "one.pbrt", "--up", "z", "--by", "facade"];
         let output = ["--samples", "16", "-o", "one.csv"];
         place.run(&[&flags[..], &output].concat()).expect(0);
-        assert_eq!(table(&place, "one.csv")[1][1], facade, "{turn}");
+        assert_eq!(place.rows("one.csv")[1][1], facade, "{turn}");
     }
 }

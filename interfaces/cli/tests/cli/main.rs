@@ -16,7 +16,7 @@
 //! - `looking`: viewers, what is said meanwhile, and the standard input
 //! - `occlusion`: `ao`;  `sunlight`: `sun`;  `sight`: `visible`
 //! - `terrain`: height rasters and viewsheds;  `placing`: sensors on surfaces, and times of `sun`
-//! - `grouping`: results by object and facade, elevations, moving shadows; `horizon`, `factors`
+//! - `grouping`: results by object and facade, elevations, moving shadows; `factors`;  `horizons`: `horizon`
 //! - `book`: links, tables and code of the pages for readers
 //! - `looks`: meshes with materials, camera flags, layers, pictures for displays
 //! - `cameras`: cameras in `info` and `ao`, and light from images around a mesh
@@ -32,6 +32,7 @@ mod damaged;
 mod describing;
 mod farming;
 mod grouping;
+mod horizons;
 mod images;
 mod inputs;
 mod killing;

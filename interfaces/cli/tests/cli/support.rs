@@ -75,6 +75,13 @@ impl Place {
         }
     }
 
+    /// Lines of a table of comma-separated values, and the fields of each.
+    pub fn rows(&self, name: &str) -> Vec<Vec<String>> {
+        let text = fs::read_to_string(self.path(name)).expect("a table");
+        let fields = |line: &str| line.split(',').map(str::to_owned).collect();
+        text.lines().map(fields).collect()
+    }
+
     /// Runs the program here and presses Ctrl-C so long after it began to listen; returns the exit code.
     #[cfg(target_os = "linux")]
     pub fn interrupt(&self, args: &[&str], after: std::time::Duration) -> Option<i32> {
