@@ -3,6 +3,7 @@
 use std::collections::HashSet;
 
 use crate::Error;
+use crate::angles::sin_cos_degrees;
 
 /// Heights of the cells of a raster, row by row.
 ///
@@ -140,6 +141,61 @@ impl<'a> HeightField<'a> {
     pub fn along(&self, [columns, rows]: [f64; 2]) -> [f64; 2] {
         let [_, a, b, _, d, e] = self.transform;
         [a * columns + b * rows, d * columns + e * rows]
+    }
+
+    /// Columns and rows of a length of 1 in an azimuth, in degrees from the north of the map (`y`) through east.
+    pub(crate) fn step(&self, azimuth: f64) -> [f64; 2] {
+        let [_, a, b, _, d, e] = self.transform;
+        let area = a * e - b * d;
+        let (x, y) = sin_cos_degrees(azimuth);
+        [(e * x - b * y) / area, (a * y - d * x) / area]
+    }
+
+    /// Normal of the surface at a cell in map coordinates, of length 1 and upwards: the mean of the triangles around it, weighted by
+    /// area. `None` for a cell without a triangle.
+    ///
+    /// # Panics
+    /// If there is no such cell.
+    pub fn normal(&self, [column, row]: [usize; 2]) -> Option<[f64; 3]> {
+        // All triangles are as large in plan, so that their gradients have the same weight.
+        let (mut sum, mut count) = ([0.0; 2], 0.0);
+        let mut add = |columns: f64, rows: f64| {
+            sum = [sum[0] + columns, sum[1] + rows];
+            count += 1.0;
+        };
+        for corner in 0..4 {
+            let [left, top] = [(column, corner & 1), (row, corner >> 1)]
+                .map(|(at, before)| at as f64 - before as f64);
+            let at = |c: f64, r: f64| self.height_at([left + c, top + r]);
+            let corners = [at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0), at(1.0, 1.0)];
+            if corners[corner].is_none() {
+                continue;
+            }
+            match corners {
+                [Some(a), right, below, Some(d)] => {
+                    // Of both triangles, those that have the cell.
+                    if let (Some(b), true) = (right, corner != 2) {
+                        add(b - a, d - b);
+                    }
+                    if let (Some(c), true) = (below, corner != 1) {
+                        add(d - c, c - a);
+                    }
+                }
+                [Some(a), Some(b), Some(c), None] => add(b - a, c - a),
+                [None, Some(b), Some(c), Some(d)] => add(d - c, d - b),
+                _ => {}
+            }
+        }
+        let [_, a, b, _, d, e] = self.transform;
+        let area = (a * e - b * d) * count;
+        let [columns, rows] = sum;
+        let normal = [
+            (d * rows - e * columns) / area,
+            (b * columns - a * rows) / area,
+            1.0,
+        ];
+        let length = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+        (count > 0.0).then(|| normal.map(|x| x / length))
     }
 
     /// Whether the eye of an observer is below the surface.

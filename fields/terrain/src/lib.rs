@@ -7,6 +7,7 @@
 //! | how high is the horizon of each cell along a step between cells | [`Sweep::horizons`] | a number for each cell |
 //! | the same in any other azimuth | [`March::horizons`] | a number for each cell |
 //! | which azimuths have such steps, and how much of the circle is each | [`Lattice`] | steps, degrees, weights |
+//! | which cells get light from a direction | [`Shadows::lit`] | a bit for each cell |
 //! | which cells does an observer see | [`Viewer::sees`] | a bit for each cell |
 //!
 //! The share of the sky that level ground receives light from, with 16 azimuths, is the mean of the squared cosines of horizons:
@@ -31,12 +32,14 @@
 //! ```
 //!
 //! - `height_field`: heights as a surface of triangles;  `lattice`: steps and their azimuths
-//! - `sweep`, `march`: horizons;  `viewshed`: viewsheds
+//! - `sweep`, `march`: horizons;  `shadows`: light from far away;  `viewshed`: viewsheds
+//! - `crossing`: crossings of lines of sight with edges
 //! - `angles`: degrees;  `monitor`: progress and cancellation;  `memory`: lists that may not fit;  `error`: why there is no result
 #![forbid(unsafe_code)]
 
 #[doc(hidden)]
 pub mod angles;
+mod crossing;
 mod error;
 mod height_field;
 mod lattice;
@@ -44,6 +47,7 @@ mod march;
 #[doc(hidden)]
 pub mod memory;
 mod monitor;
+mod shadows;
 mod sweep;
 mod viewshed;
 
@@ -55,5 +59,6 @@ pub use march::March;
 pub use monitor::Monitor;
 #[doc(hidden)]
 pub use monitor::Progress;
+pub use shadows::{Shadows, per_cell};
 pub use sweep::Sweep;
 pub use viewshed::{Limits, Viewer};

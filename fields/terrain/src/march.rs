@@ -23,8 +23,8 @@ use std::ops::Range;
 use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
 use rayon::prelude::*;
 
-use crate::angles::{check_azimuths, sin_cos_degrees};
-use crate::height_field::families;
+use crate::angles::check_azimuths;
+use crate::crossing::{Crossing, is_edge};
 use crate::{Error, HeightField, Monitor, Progress, memory};
 
 /// Cells on a side of the squares of each level. Cells of one of the smallest are walked from together.
@@ -145,27 +145,6 @@ impl Peaks {
     }
 }
 
-/// A crossing of a line of sight with an edge.
-struct Crossing {
-    /// Columns and rows from the eye to both ends of the edge, which are one if the line crosses a corner.
-    ends: [[isize; 2]; 2],
-    /// The same as cells of the raster, row by row.
-    offsets: [isize; 2],
-    /// Part of the edge before the crossing.
-    part: f64,
-    distance: f64,
-    /// Of the distance.
-    reciprocal: f64,
-}
-
-impl Crossing {
-    /// Slope from an eye to the crossing, on a flat earth.
-    #[inline(always)]
-    fn slope(&self, [a, b]: [f64; 2], eye: f64) -> f64 {
-        (a + self.part * (b - a) - eye) * self.reciprocal
-    }
-}
-
 /// Crossings between two distances.
 struct Stretch {
     /// Crossings, or stretches of the level below.
@@ -186,50 +165,7 @@ struct Way {
 
 impl Way {
     fn new(march: &March<'_>, azimuth: f64) -> Self {
-        let field = march.field;
-        let [_, a, b, _, d, e] = field.transform();
-        let area = a * e - b * d;
-        let (x, y) = sin_cos_degrees(azimuth);
-        // Columns and rows to a length of 1.
-        let step = [(e * x - b * y) / area, (a * y - d * x) / area];
-        let mut crossings = Vec::new();
-        let most = field.size().map(|size| size as isize - 1);
-        for &(family @ [u, v], along) in families(field.has_holes()) {
-            let speed = u as f64 * step[0] + v as f64 * step[1];
-            if speed == 0.0 {
-                continue;
-            }
-            // The coordinate that tells places on a line of the family apart.
-            let axis = usize::from(along[0] == 0);
-            for line in 1.. {
-                let distance = line as f64 / speed.abs();
-                let line = if speed < 0.0 { -line } else { line };
-                let place = distance * step[axis];
-                let (low, part) = (place.floor() as isize, place - place.floor());
-                let first = match family {
-                    [1, 0] => [line, low],
-                    [0, 1] => [low, line],
-                    // `line` is the column less, or with, the row.
-                    [_, sign] => [low, sign * (line - low)],
-                };
-                let second = [first[0] + along[0], first[1] + along[1]];
-                let ends = [first, if part == 0.0 { first } else { second }];
-                let is_in = |end: &[isize; 2]| end[0].abs() <= most[0] && end[1].abs() <= most[1];
-                if !ends.iter().all(is_in) {
-                    // Beyond all cells, as is all behind it.
-                    break;
-                }
-                let [width, _] = field.size();
-                crossings.push(Crossing {
-                    ends,
-                    offsets: ends.map(|[column, row]| row * width as isize + column),
-                    part,
-                    distance,
-                    reciprocal: 1.0 / distance,
-                });
-            }
-        }
-        crossings.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+        let crossings = Crossing::all(march.field, azimuth, f64::INFINITY);
         let small = Self::small(&crossings);
         let middle = Self::larger(&small, SIDES[1] / SIDES[0]);
         let large = Self::larger(&middle, SIDES[2] / SIDES[1]);
@@ -474,13 +410,5 @@ impl Square<'_> {
                 self.most[row][lane] = slope;
             }
         }
-    }
-}
-
-/// Whether a triangle has the edge between two cells with data, or the corner if they are one.
-fn is_edge(field: &HeightField<'_>, [a, b]: [[f64; 2]; 2]) -> bool {
-    match a == b {
-        true => field.has_triangle(a),
-        false => field.has_edge(a, b),
     }
 }

@@ -48,18 +48,22 @@ impl SkyPatches {
     /// [`sky_view`] of a surface with this normal (of length 1, in terms of east, north and up) that sees these patches: a row of
     /// a [`BitMatrix`](crate::BitMatrix).
     pub fn view(&self, normal: [f64; 3], weighting: Weighting, seen: &[u64]) -> f64 {
-        let weight = |patch: usize, normal: [f64; 3]| {
-            let cosine = match weighting {
-                Weighting::Cosine => dot(self.centres[patch], normal).max(0.0),
-                Weighting::Uniform => 1.0,
-            };
-            self.solid_angles[patch] * cosine
-        };
         let sum = |patches: &mut dyn Iterator<Item = usize>, normal| {
-            patches.fold(0.0, |sum, patch| sum + weight(patch, normal))
+            patches.fold(0.0, |sum, patch| {
+                sum + self.weight(patch, normal, weighting)
+            })
         };
         let all = sum(&mut (0..self.len()), [0.0, 0.0, 1.0]);
         sum(&mut ones(seen), normal) / all
+    }
+
+    /// Weight of a patch for a surface with this normal.
+    pub(crate) fn weight(&self, patch: usize, normal: [f64; 3], weighting: Weighting) -> f64 {
+        let cosine = match weighting {
+            Weighting::Cosine => dot(self.centres[patch], normal).max(0.0),
+            Weighting::Uniform => 1.0,
+        };
+        self.solid_angles[patch] * cosine
     }
 
     /// Light in W/m² on a surface with this normal (of length 1, in terms of east, north and up) from the patches that it sees.

@@ -261,61 +261,40 @@ impl SunValues {
         pairs.map(|(direct, diffuse)| direct + diffuse).collect()
     }
 
-    /// Values of sensors from the suns and patches that they see.
-    fn new(job: &SunJob<'_>, suns_seen: &BitMatrix, sky_seen: &BitMatrix) -> Result<Self, Error> {
-        let Sunlight {
-            suns,
-            patches,
-            orientation,
-            ..
-        } = job.sunlight;
-        let sky = job.sunlight.sky()?;
-        let to_suns = to_suns(suns);
+    /// Lists with room for so many sensors, with their values by month or without them.
+    pub(crate) fn with_room(
+        sensors: usize,
+        lights: &Lights<'_>,
+        by_month: bool,
+    ) -> Result<Self, Error> {
         let mut values = Self::default();
-        for (list, width) in values.lists(sky.is_some()) {
-            *list = memory::room("values", width * job.places.points.len())?;
-        }
-        for row in 0..job.places.points.len() {
-            let Some(normal) = facing(job.facing.get(row).copied(), orientation) else {
-                values.push_none(sky.is_some());
-                continue;
-            };
-            let (mut months, mut direct_months) = ([0.0; 12], [0.0; 12]);
-            let (mut hours, mut direct) = (0.0, 0.0);
-            for sun in ones(suns_seen.row(row)) {
-                hours += suns.hours[sun];
-                months[suns.months[sun]] += suns.hours[sun];
-                let beam = suns.direct[sun] * dot(normal, to_suns[sun]).max(0.0);
-                direct += beam;
-                direct_months[suns.months[sun]] += beam;
-            }
-            let seen = sky_seen.row(row);
-            values.hours.push(hours);
-            values.by_month.extend(months);
-            let view = patches.view(normal, Weighting::Cosine, seen);
-            values.sky_view.push(view);
-            let open = patches.view(normal, Weighting::Uniform, seen);
-            values.sky_open.push(open);
-            if let Some(sky) = &sky {
-                let diffuse = |sky: &Vec<f64>| match sky.is_empty() {
-                    true => 0.0,
-                    false => patches.irradiance(normal, sky, seen) / 1000.0,
-                };
-                values.direct.push(direct / 1000.0);
-                values.diffuse.push(diffuse(&sky.of_all));
-                let direct = direct_months.map(|direct| direct / 1000.0);
-                values.direct_by_month.extend(direct);
-                let diffuse = sky.by_month.iter().map(diffuse);
-                values.diffuse_by_month.extend(diffuse);
-            }
+        for (list, width) in values.lists(lights.sky.is_some()) {
+            let width = if width > 1 && !by_month { 0 } else { width };
+            *list = memory::room("values", width * sensors)?;
         }
         Ok(values)
     }
 
-    /// Adds a sensor without values.
-    fn push_none(&mut self, is_measured: bool) {
-        for (list, width) in self.lists(is_measured) {
-            list.extend(std::iter::repeat_n(f64::NAN, width));
+    /// Adds a sensor, which has no values if it faces nowhere.
+    pub(crate) fn push(&mut self, lights: &Lights<'_>, received: Option<&Received>) {
+        let none = Received::nothing();
+        let received = received.unwrap_or(&none);
+        let kilo = |watts: f64| watts / 1000.0;
+        self.hours.push(received.hours);
+        self.sky_view.push(received.view / lights.whole_view);
+        self.sky_open.push(received.open / lights.whole_sky);
+        if lights.sky.is_some() {
+            self.direct.push(kilo(received.direct));
+            self.diffuse.push(kilo(received.diffuse));
+        }
+        let Some(months) = &received.by_month else {
+            return;
+        };
+        let [hours, direct, diffuse] = **months;
+        self.by_month.extend(hours);
+        if lights.sky.is_some() {
+            self.direct_by_month.extend(direct.map(kilo));
+            self.diffuse_by_month.extend(diffuse.map(kilo));
         }
     }
 
@@ -331,6 +310,115 @@ impl SunValues {
     }
 }
 
+/// Suns and patches of the sky, and the light of each.
+pub(crate) struct Lights<'a> {
+    sunlight: &'a Sunlight,
+    to_suns: Vec<[f64; 3]>,
+    sky: Option<SkyLight>,
+    /// Sums over all patches on open level ground.
+    whole_view: f64,
+    whole_sky: f64,
+}
+
+/// What a sensor received so far.
+#[derive(Clone)]
+pub(crate) struct Received {
+    hours: f64,
+    /// Irradiation by the sun and the sky in Wh/m².
+    direct: f64,
+    diffuse: f64,
+    /// Solid angle of the sky, weighted by the cosine and as it is.
+    view: f64,
+    open: f64,
+    /// Hours, direct and diffuse irradiation of each month, if they are wanted.
+    by_month: Option<Box<[[f64; 12]; 3]>>,
+}
+
+impl Received {
+    /// A sensor without light.
+    pub fn new(by_month: bool) -> Self {
+        Self::all(0.0, by_month)
+    }
+
+    /// A sensor without values.
+    fn nothing() -> Self {
+        Self::all(f64::NAN, true)
+    }
+
+    fn all(value: f64, by_month: bool) -> Self {
+        Self {
+            hours: value,
+            direct: value,
+            diffuse: value,
+            view: value,
+            open: value,
+            by_month: by_month.then(|| Box::new([[value; 12]; 3])),
+        }
+    }
+}
+
+impl<'a> Lights<'a> {
+    pub fn new(sunlight: &'a Sunlight) -> Result<Self, Error> {
+        let patches = &sunlight.patches;
+        let all = |weighting| {
+            (0..patches.len()).fold(0.0, |sum, patch| sum + patches.weight(patch, UP, weighting))
+        };
+        Ok(Self {
+            sunlight,
+            to_suns: to_suns(&sunlight.suns),
+            sky: sunlight.sky()?,
+            whole_view: all(Weighting::Cosine),
+            whole_sky: all(Weighting::Uniform),
+        })
+    }
+
+    /// Number of suns and patches.
+    pub fn len(&self) -> usize {
+        self.to_suns.len() + self.sunlight.patches.len()
+    }
+
+    /// Direction to a sun, or to one of the patches behind them, in terms of east, north and up.
+    pub fn direction(&self, light: usize) -> [f64; 3] {
+        match light.checked_sub(self.to_suns.len()) {
+            None => self.to_suns[light],
+            Some(patch) => self.sunlight.patches.centres[patch],
+        }
+    }
+
+    /// Adds what a surface with this normal receives from a light that it sees.
+    pub fn add(&self, received: &mut Received, normal: [f64; 3], light: usize) {
+        let Sunlight { suns, patches, .. } = self.sunlight;
+        if let Some(patch) = light.checked_sub(self.to_suns.len()) {
+            received.view += patches.weight(patch, normal, Weighting::Cosine);
+            received.open += patches.weight(patch, normal, Weighting::Uniform);
+            let Some(sky) = &self.sky else {
+                return;
+            };
+            let cosine = dot(patches.centres[patch], normal).max(0.0);
+            let of = |radiances: &[f64]| radiances[patch] * patches.solid_angles[patch] * cosine;
+            received.diffuse += of(&sky.of_all);
+            if let Some(months) = &mut received.by_month {
+                let known = sky.by_month.iter().zip(&mut months[2]);
+                known
+                    .filter(|(sky, _)| !sky.is_empty())
+                    .for_each(|(sky, diffuse)| *diffuse += of(sky));
+            }
+            return;
+        }
+        let (hours, month) = (suns.hours[light], suns.months[light]);
+        let beam = suns.direct[light] * dot(normal, self.to_suns[light]).max(0.0);
+        received.hours += hours;
+        received.direct += beam;
+        if let Some(months) = &mut received.by_month {
+            months[0][month] += hours;
+            months[1][month] += beam;
+        }
+    }
+}
+
+/// Normal of level ground.
+const UP: [f64; 3] = [0.0, 0.0, 1.0];
+
 /// Directions to suns in terms of east, north and up.
 pub(crate) fn to_suns(suns: &Suns) -> Vec<[f64; 3]> {
     let direction =
@@ -341,7 +429,7 @@ pub(crate) fn to_suns(suns: &Suns) -> Vec<[f64; 3]> {
 /// Normal in terms of east, north and up, of length 1. Of points in free space, what falls on a level surface counts.
 pub(crate) fn facing(normal: Option<[f32; 3]>, orientation: &Orientation) -> Option<[f64; 3]> {
     match normal {
-        None => Some([0.0, 0.0, 1.0]),
+        None => Some(UP),
         Some(normal) => unscaled_unit(orientation.local(normal.map(f64::from))),
     }
 }
@@ -454,8 +542,22 @@ impl Job for SunJob<'_> {
 
     fn found(&self, words: Vec<u64>) -> Result<SunFound, Error> {
         let (suns_seen, sky_seen) = self.split(&words)?;
+        let (lights, sensors) = (Lights::new(self.sunlight)?, self.places.points.len());
+        let mut values = SunValues::with_room(sensors, &lights, true)?;
+        for (row, words) in words
+            .chunks_exact(lights.len().div_ceil(64).max(1))
+            .enumerate()
+        {
+            let normal = facing(self.facing.get(row).copied(), &self.sunlight.orientation);
+            let received = normal.map(|normal| {
+                let mut received = Received::new(true);
+                ones(words).for_each(|light| lights.add(&mut received, normal, light));
+                received
+            });
+            values.push(&lights, received.as_ref());
+        }
         Ok(SunFound {
-            values: SunValues::new(self, &suns_seen, &sky_seen)?,
+            values,
             suns_seen,
             sky_seen,
         })

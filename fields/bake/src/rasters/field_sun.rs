@@ -1,0 +1,248 @@
+//! Sun and sky on the cells of height fields.
+
+use std::ops::Range;
+
+use antumbra::Bvh;
+use antumbra_terrain::angles::sin_cos_degrees;
+use antumbra_terrain::{HeightField, Shadows, per_cell};
+
+use crate::sun::sunlight::{Lights, Received, facing};
+use crate::vector::dot;
+use crate::{
+    Answers, BitMatrix, Error, Job, Key, Monitor, Progress, Size, SunFound, SunValues, Sunlight,
+    memory, ones,
+};
+
+/// Job of [`SunValues`] of the cells of a height field, as of [`SunJob`](crate::SunJob), but by [`Shadows`]: exact, without rays, and
+/// from the surface itself. Sensors are the cells with data, which face as the surface does.
+///
+/// Its items are suns and patches of the sky, since a sweep answers all cells at once.
+pub struct FieldSunJob<'a> {
+    field: &'a HeightField<'a>,
+    shadows: Shadows<'a>,
+    lights: Lights<'a>,
+    sunlight: &'a Sunlight,
+    rise: f64,
+    /// Azimuth on the map and slope of each light.
+    directions: Vec<[f64; 2]>,
+    /// Normals of all cells; 0 without a triangle.
+    normals: Vec<[f32; 3]>,
+    by_month: bool,
+}
+
+/// A cell, and the lights that it sees if these are kept.
+struct Cell<'a> {
+    received: Received,
+    seen: &'a mut [u64],
+}
+
+/// Lights that are answered at once.
+const BATCH: usize = 64;
+
+impl<'a> FieldSunJob<'a> {
+    /// The job of sensors that are `rise` above their cells. `north` is the angle from the north of the map (`y`) to true north, as of
+    /// the orientation that the sunlight was made with. Without `by_month`, lists of months stay empty, which take 288 bytes a cell.
+    ///
+    /// # Errors
+    /// [`Error::NoMemory`], or [`Error::Range`] if a measured sky is out of its range.
+    pub fn new(
+        field: &'a HeightField<'a>,
+        sunlight: &'a Sunlight,
+        (rise, north): (f64, f64),
+        by_month: bool,
+    ) -> Result<Self, Error> {
+        let suns = sunlight.suns.positions.iter();
+        let tangent = |elevation: f64| {
+            let (sin, cos) = sin_cos_degrees(elevation);
+            sin / cos
+        };
+        let suns = suns.map(|sun| [sun.azimuth + north, tangent(sun.elevation)]);
+        let patches = sunlight
+            .patches
+            .centres
+            .iter()
+            .map(|&[east, up_north, up]| {
+                [
+                    libm::atan2(east, up_north).to_degrees() + north,
+                    up / libm::hypot(east, up_north),
+                ]
+            });
+        let [width, height] = field.size();
+        let mut normals = memory::room("normals", width * height)?;
+        for row in 0..height {
+            let normal = |column| field.normal([column, row]).unwrap_or_default();
+            normals.extend((0..width).map(|column| normal(column).map(|x| x as f32)));
+        }
+        Ok(Self {
+            field,
+            shadows: Shadows::new(field, rise)?,
+            lights: Lights::new(sunlight)?,
+            sunlight,
+            rise,
+            directions: suns.chain(patches).collect(),
+            normals,
+            by_month,
+        })
+    }
+
+    /// Normals of the cells with data.
+    pub fn normals(&self) -> Vec<[f32; 3]> {
+        self.with_data().map(|cell| self.normals[cell]).collect()
+    }
+
+    fn with_data(&self) -> impl Iterator<Item = usize> {
+        let heights = self.field.heights();
+        (0..heights.len()).filter(|&cell| heights[cell].is_finite())
+    }
+
+    /// Computes the job with little memory: 64 directions at once. What each sensor sees is in the result only if it is to be kept.
+    ///
+    /// # Errors
+    /// [`Error::NoMemory`], [`Error::Cancelled`].
+    pub fn whole(&self, keeps: bool, monitor: &dyn Monitor) -> Result<SunFound, Error> {
+        let batches = self.directions.len().div_ceil(BATCH);
+        let progress = Progress::new(monitor, self.directions.len());
+        self.sums(
+            keeps,
+            (0..batches).map(|batch| {
+                let first = BATCH * batch;
+                let directions =
+                    &self.directions[first..(first + BATCH).min(self.directions.len())];
+                let planes = self.shadows.all_lit(directions, &Quiet(monitor))?;
+                progress.add(directions.len());
+                Ok(planes)
+            }),
+        )
+    }
+
+    /// Sums over planes, which come in batches.
+    fn sums<P: AsRef<[u64]> + Sync>(
+        &self,
+        keeps: bool,
+        batches: impl Iterator<Item = Result<Vec<P>, Error>>,
+    ) -> Result<SunFound, Error> {
+        let [width, _] = self.field.size();
+        let cells = self.normals.len();
+        let lights = self.lights.len();
+        let mut seen = BitMatrix::new(if keeps { cells } else { 0 }, lights)?;
+        let per_row = seen.words_per_row();
+        let mut rows = seen.words_mut().chunks_mut(per_row.max(1));
+        let mut all = memory::room("cells", cells)?;
+        all.extend((0..cells).map(|_| Cell {
+            received: Received::new(self.by_month),
+            seen: rows.next().unwrap_or_default(),
+        }));
+        for (batch, planes) in batches.enumerate() {
+            per_cell(&planes?, width, &mut all, |cell, own, word| {
+                self.add(
+                    &mut own.received,
+                    cell,
+                    BATCH * batch,
+                    word,
+                    own.seen.get_mut(batch),
+                );
+            });
+        }
+        let mut values = SunValues::with_room(cells, &self.lights, self.by_month)?;
+        for cell in self.with_data() {
+            let faces = self.normals[cell] != [0.0; 3];
+            values.push(&self.lights, faces.then_some(&all[cell].received));
+        }
+        drop(all);
+        let suns = self.sunlight.suns.times.len();
+        let mut parts = [suns, lights - suns]
+            .map(|columns| BitMatrix::new(if keeps { values.hours.len() } else { 0 }, columns));
+        if let ([Ok(suns_seen), Ok(sky_seen)], true) = (&mut parts, keeps) {
+            for (row, cell) in self.with_data().enumerate() {
+                for light in ones(seen.row(cell)) {
+                    match light.checked_sub(suns) {
+                        None => suns_seen.set(row, light, true),
+                        Some(patch) => sky_seen.set(row, patch, true),
+                    }
+                }
+            }
+        }
+        let [suns_seen, sky_seen] = parts;
+        Ok(SunFound {
+            suns_seen: suns_seen?,
+            sky_seen: sky_seen?,
+            values,
+        })
+    }
+
+    /// Adds what a cell receives from those of 64 lights that it sees and faces, and notes them.
+    fn add(
+        &self,
+        received: &mut Received,
+        cell: usize,
+        first: usize,
+        lit: u64,
+        seen: Option<&mut u64>,
+    ) {
+        let normal = facing(Some(self.normals[cell]), &self.sunlight.orientation);
+        let Some(normal) = normal.filter(|_| lit != 0) else {
+            return;
+        };
+        let mut faced = 0;
+        for bit in ones(&[lit]) {
+            let light = first + bit;
+            if dot(normal, self.lights.direction(light)) > 0.0 {
+                faced |= 1 << bit;
+                self.lights.add(received, normal, light);
+            }
+        }
+        if let Some(seen) = seen {
+            *seen = faced;
+        }
+    }
+}
+
+/// Passes cancellation on, and no progress.
+struct Quiet<'a>(&'a dyn Monitor);
+
+impl Monitor for Quiet<'_> {
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+}
+
+impl Job for FieldSunJob<'_> {
+    type Found = SunFound;
+    type Number = u64;
+
+    const NAME: &'static str = "field-sun/1";
+
+    fn size(&self) -> Size {
+        let [width, height] = self.field.size();
+        let cells = self.normals.len() as u64;
+        Size::each(self.directions.len(), cells, height * width.div_ceil(64))
+    }
+
+    fn identify(&self, key: &mut Key) {
+        key.text(&format!(
+            "{:?} {:?} {}",
+            self.field.size(),
+            self.field.transform(),
+            self.rise
+        ));
+        key.numbers(self.directions.as_flattened());
+        key.numbers(self.field.heights());
+    }
+
+    fn answers(&self, _: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers<Self> {
+        Ok(self
+            .shadows
+            .all_lit(&self.directions[items], monitor)?
+            .concat())
+    }
+
+    fn found(&self, words: Vec<u64>) -> Result<SunFound, Error> {
+        let [width, height] = self.field.size();
+        let planes = words.chunks_exact(height * width.div_ceil(64));
+        let planes: Vec<&[u64]> = planes.collect();
+        if planes.len() != self.directions.len() {
+            return Err(Error::Answers);
+        }
+        self.sums(true, planes.chunks(BATCH).map(|planes| Ok(planes.to_vec())))
+    }
+}
