@@ -90,6 +90,14 @@ impl<'a> FieldSunJob<'a> {
         self.with_data().map(|cell| self.normals[cell]).collect()
     }
 
+    /// Bytes that [`FieldSunJob::whole`] takes, about.
+    pub fn memory(&self, keeps: bool) -> u64 {
+        let months = if self.by_month { 2 * 288 } else { 0 };
+        let kept = if keeps { 2 * self.lights.len() / 8 } else { 0 };
+        let bytes = size_of::<Cell<'_>>() + 5 * size_of::<f64>() + BATCH / 8 + months + kept;
+        self.normals.len() as u64 * bytes as u64
+    }
+
     fn with_data(&self) -> impl Iterator<Item = usize> {
         let heights = self.field.heights();
         (0..heights.len()).filter(|&cell| heights[cell].is_finite())

@@ -3,9 +3,11 @@
 //! - `closed_forms`, `reference`: results that are known on paper, or from other programs
 //! - `visibility`: what points see, against brute force
 //! - `viewshed`, `height_fields`: terrain, against all triangles in double precision
+//! - `field_sun`: sun and sky of terrain, against rays
 //! - `promises`: equal bits, errors, cancellation
 
 mod closed_forms;
+mod field_sun;
 mod height_fields;
 mod promises;
 mod reference;

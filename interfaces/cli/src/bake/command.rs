@@ -1,5 +1,6 @@
 //! The steps that all bakes have in common.
 
+use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -110,6 +111,7 @@ pub fn run(
         chunks,
         isa,
         memory,
+        has_threads: Cell::new(false),
         parts,
     };
     let maps = if args.is_picture() { &[] } else { outputs };
@@ -131,6 +133,7 @@ pub struct Bake<'a> {
     chunks: &'a ChunkArgs,
     pub isa: Isa,
     memory: MemorySize,
+    has_threads: Cell<bool>,
     /// Shares to take instead of computing anything.
     pub parts: Option<&'a [PartFile]>,
 }
@@ -206,15 +209,23 @@ impl Bake<'_> {
         Ok(files)
     }
 
+    /// Starts the threads, once.
+    fn start_threads(&self) -> Result<(), Failure> {
+        match self.has_threads.replace(true) {
+            true => Ok(()),
+            false => self.chunks.machine.start_threads(),
+        }
+    }
+
     /// Starts the threads, reads the scene and builds its tree, [bent](Ground::load) if flags say so.
     pub fn ground(&self, files: &mut Files, bent: Option<&VisibleArgs>) -> Result<Ground, Failure> {
-        self.chunks.machine.start_threads()?;
+        self.start_threads()?;
         Ground::load(self.scene, self.isa, self.memory, files, bent)
     }
 
     /// Starts the threads and reads a height raster, for a job without a mesh and without a tree.
     pub fn terrain(&self, files: &mut Files) -> Result<Terrain, Failure> {
-        self.chunks.machine.start_threads()?;
+        self.start_threads()?;
         Terrain::load(self.scene, self.memory, files)
     }
 

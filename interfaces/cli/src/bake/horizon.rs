@@ -206,11 +206,10 @@ fn of_cells(args: &HorizonArgs, bake: &Bake<'_>, mut files: Files) -> Result<(),
     };
     let rise = args.places.placement.height / args.places.units.metres();
     let job = FieldHorizonJob::new(&field, &directions, rise, 0.0)?;
-    let has_data = |cell: &usize| values[*cell].is_finite();
     let horizon = Horizon {
         name: &terrain.name,
         azimuths: &azimuths,
-        number: (0..values.len()).filter(has_data).count(),
+        number: terrain.cells().count(),
         triangles: field.triangles(),
         seconds: [terrain.load_seconds, start.elapsed().as_secs_f64()],
     };
@@ -219,26 +218,17 @@ fn of_cells(args: &HorizonArgs, bake: &Bake<'_>, mut files: Files) -> Result<(),
     {
         return horizon.write_planes(bake, path, &grid, &job);
     }
-    let cells: Vec<usize> = (0..values.len()).filter(has_data).collect();
-    let local = terrain.local();
-    let point = |&cell: &usize| {
-        let [x, y] = grid.centre(cell % grid.width, cell / grid.width);
-        local.local([x, y, values[cell]])
-    };
     let mut done = bake.compute_cells(&job, &terrain.name)?;
     let planes = done.found.take();
     // Of cells with data, all azimuths of one after the other.
     let of_cell = |planes: &Vec<f32>| {
         let angles =
-            |&cell: &usize| (0..azimuths.len()).map(move |at| planes[at * values.len() + cell]);
-        cells.iter().flat_map(angles).collect()
+            |cell: usize| (0..azimuths.len()).map(move |at| planes[at * values.len() + cell]);
+        terrain.cells().flat_map(angles).collect()
     };
     done.found = planes.as_ref().map(of_cell);
-    let sensors = Sensors {
-        points: cells.iter().map(point).collect(),
-        ..Sensors::default()
-    };
-    horizon.write(bake, (&sensors, local, &done), |path, _| {
+    let sensors = terrain.sensors(0.0);
+    horizon.write(bake, (&sensors, terrain.local(), &done), |path, _| {
         let planes = planes.as_deref().unwrap_or_default();
         raster::write_values(path, &grid, planes, QUANTITY)
     })?;

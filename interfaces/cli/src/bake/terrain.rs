@@ -4,13 +4,14 @@ use std::path::Path;
 use std::time::Instant;
 
 use antumbra::LocalOrigin;
-use antumbra_bake::{HeightField, UpAxis};
+use antumbra_bake::{HeightField, Sensors, UpAxis};
+use antumbra_lab::count;
 use antumbra_load::{Extent, Heights, MemorySize};
-use antumbra_raster::{Crs, Grid};
+use antumbra_raster::{Crs, Grid, Site};
 
 use super::raster::is_raster;
 use super::site::Asked;
-use crate::exit::Failure;
+use crate::exit::{Failure, tell};
 use crate::output::Files;
 use crate::scenes;
 
@@ -46,11 +47,63 @@ impl Terrain {
         })
     }
 
-    /// Settles what its coordinate system answers.
-    pub fn settle(&self, asked: &Asked<'_>) -> Result<(), Failure> {
+    /// Settles what its coordinate system answers. Returns the place on the earth, if it is known.
+    pub fn settle(&self, asked: &Asked<'_>) -> Result<Option<Site>, Failure> {
         let middle = self.extent.low.midpoint(self.extent.high).to_array();
         let own = self.heights.raster.grid.crs.as_ref();
-        asked.settle(&self.name, own, middle).map(drop)
+        asked.settle(&self.name, own, middle)
+    }
+
+    /// Cells with data.
+    pub fn cells(&self) -> impl Iterator<Item = usize> + Clone {
+        let heights = &self.heights.raster.values;
+        (0..heights.len()).filter(|&cell| heights[cell].is_finite())
+    }
+
+    /// Sensors at the cells with data, so high above them.
+    pub fn sensors(&self, rise: f64) -> Sensors {
+        let (raster, local) = (&self.heights.raster, self.local());
+        let point = |cell: usize| {
+            let width = raster.grid.width;
+            let [x, y] = raster.grid.centre(cell % width, cell / width);
+            local.local([x, y, raster.values[cell] + rise])
+        };
+        Sensors {
+            points: self.cells().map(point).collect(),
+            ..Sensors::default()
+        }
+    }
+
+    /// Values of all cells, of values of those with data.
+    pub fn spread(&self, values: &[f32]) -> Vec<f32> {
+        let mut all = vec![f32::NAN; self.heights.raster.values.len()];
+        for (cell, &value) in self.cells().zip(values) {
+            all[cell] = value;
+        }
+        all
+    }
+
+    /// Says what was read.
+    pub fn tell_read(&self) {
+        let [x, y, z] = self.extent.size().to_array().map(scenes::rounded);
+        let grid = &self.heights.raster.grid;
+        tell(format_args!(
+            "{}: {x} x {y} x {z} {} (x, y, z); z is up, as rasters of heights have it; {} x {} cells",
+            self.name,
+            scenes::unit(grid.crs.as_ref()),
+            grid.width,
+            grid.height
+        ));
+    }
+
+    /// Says how many cells were read.
+    pub fn tell(&self) {
+        tell(format_args!(
+            "{}: {} cells, loaded in {:.2} s",
+            self.name,
+            count(self.cells().count() as u64),
+            self.load_seconds
+        ));
     }
 
     /// Its surface.

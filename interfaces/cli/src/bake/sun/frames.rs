@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use antumbra_bake::{Hourly, Moment, Sunlight};
+use antumbra_bake::{Hourly, Moment, SunFound, Sunlight};
 use antumbra_image::atomic_write;
 use antumbra_map::{Animation, Drawing, Steps};
 
@@ -68,16 +68,16 @@ pub fn declare(path: &Path, sunlight: &Sunlight, files: &mut Files) -> Result<()
 
 impl Baked<'_> {
     /// Writes a map for each step of time with a sun: as a .gif, or as numbered .png files.
-    pub fn frames(&self, path: &Path) -> Result<(), Failure> {
+    pub fn frames(&self, path: &Path, found: &SunFound) -> Result<(), Failure> {
         let hourly = Hourly::new(self.sunlight)?;
         let suns = &self.sunlight.suns;
         let steps = steps(&hourly)?;
-        let plan = self.plan();
+        let plan = self.plan()?;
         let sheet = map::Sheet::new(&self.args.map, &plan, self.sensors)?;
         let draw = |step: usize| -> Result<Drawing, Failure> {
             let sun = hourly.sun(step).unwrap_or_default();
             let lit = (0..self.sensors.points.len()).map(|row| {
-                let is_lit = self.found.suns_seen.get(row, sun);
+                let is_lit = found.suns_seen.get(row, sun);
                 if is_lit { 1.0 } else { 0.0 }
             });
             let lit: Vec<f32> = lit.collect();

@@ -38,11 +38,9 @@ pub fn is_table(path: &Path) -> Result<bool, Failure> {
 impl Baked<'_> {
     /// Writes means, ends and sums of the values of each group, and returns them.
     pub fn groups(&self, path: &Path) -> Result<Vec<Row>, Failure> {
-        let groups = self
-            .args
-            .by
-            .groups(self.ground, &self.sunlight.orientation)?;
-        let triangles = self.places.triangles(self.ground, self.up, &groups)?;
+        let (ground, places) = self.mesh()?;
+        let groups = self.args.by.groups(ground, &self.sunlight.orientation)?;
+        let triangles = places.triangles(ground, self.up, &groups)?;
         let cover = Cover::new(&groups, self.sensors, &triangles);
         let metres = self.args.places.units.metres();
         let whole = groups.areas.iter().map(|area| area * metres * metres);

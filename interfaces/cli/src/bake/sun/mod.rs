@@ -17,22 +17,28 @@ use std::path::PathBuf;
 use std::str::FromStr;
 use std::time::Instant;
 
-use antumbra_bake::{Moment, Sensors, SkyDivision, SunFound, SunJob, Sunlight, UpAxis};
+use antumbra::LocalOrigin;
+use antumbra_bake::{
+    FieldSunJob, Moment, Sensors, SkyDivision, SunFound, SunJob, Sunlight, UpAxis, Weather,
+};
 use clap::{ArgGroup, Args};
 
-use super::command::{Bake, Baking, Figure, Named};
+use super::command::{Bake, Baking, Done, Figure, Named};
 use super::files::Format;
 use super::ground::Ground;
 use super::parts::By;
 use super::places::{self, Places};
+use super::site::Asked;
+use super::terrain::{Terrain, is_terrain};
 use crate::args::{
     ChunkArgs, MapArgs, PlaceArgs, RasterArgs, SCENE, SCENE_LONG, TimeArgs, heading,
     values as checked,
 };
 use crate::exit::Failure;
-use crate::interrupt;
 use crate::json::Destination;
-use crate::output::Files;
+use crate::output::{Files, is_one_of};
+use crate::progress::Progress;
+use crate::{input, interrupt};
 use groups::Row;
 use values::{Shown, Value};
 use when::{When, read_weather};
@@ -175,11 +181,14 @@ fn sky(text: &str) -> Result<SkyDivision, String> {
 
 /// Everything that files are made of.
 struct Baked<'a> {
-    ground: &'a Ground,
-    places: &'a Places,
+    /// Name of the scene.
+    name: &'a str,
+    /// Mesh and places on it, or a raster, or both.
+    mesh: Option<(&'a Ground, &'a Places)>,
+    terrain: Option<&'a Terrain>,
+    local: LocalOrigin,
     sensors: &'a Sensors,
     sunlight: &'a Sunlight,
-    found: &'a SunFound,
     values: Vec<Value<'a>>,
     args: &'a SunArgs,
     when: &'a When,
@@ -231,9 +240,13 @@ impl Baking for SunArgs {
     fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
         let begin = Instant::now();
         let weather = self.epw.as_deref().map(read_weather).transpose()?;
+        if self.places.vertices && is_terrain(&self.scene, self.places.up) {
+            return self.of_cells(bake, (weather.as_ref(), begin), files);
+        }
         let mut ground = bake.ground(&mut files, None)?;
         let up = ground.up(self.places.up)?;
-        let (when, sunlight) = When::at(self, weather.as_ref(), &ground, up)?;
+        let site = Asked::new(&self.raster, &self.places).of(&ground.loaded, up)?;
+        let (when, sunlight) = When::at(self, weather.as_ref(), site, up)?;
         let mut frames = self.frames.iter();
         frames.try_for_each(|path| frames::declare(path, &sunlight, &mut files))?;
         let places = Places::new(&self.places, &mut ground, up)?;
@@ -243,35 +256,123 @@ impl Baking for SunArgs {
         let sensors = &places.sensors;
         let job = SunJob::new(&sensors.points, &sensors.normals, &sunlight)?;
         let done = bake.compute(&job, &ground, &ground.bvh)?;
-        let baked = done.found.as_ref().map(|found| Baked {
-            ground: &ground,
-            places: &places,
+        let baked = Baked {
+            name: &ground.loaded.scene.name,
+            mesh: Some((&ground, &places)),
+            terrain: None,
+            local: ground.local,
             sensors,
             sunlight: &sunlight,
-            found,
-            values: values::list(&found.values, self.reflected(sensors, &sunlight)),
+            values: Vec::new(),
             args: self,
             when: &when,
             weather: weather.as_ref().map(|weather| &*weather.name),
             up,
+        };
+        let triangles = ground.mesh.indices.len();
+        let seconds = [ground.loaded.seconds, ground.build_seconds];
+        baked.end(bake, (triangles, job.rays(), seconds, begin), &done)
+    }
+}
+
+impl SunArgs {
+    /// Sun and sky of the cells of a height raster: without a mesh, unless outputs are made of one.
+    fn of_cells(
+        &self,
+        bake: &Bake<'_>,
+        (weather, begin): (Option<&Weather>, Instant),
+        mut files: Files,
+    ) -> Result<(), Failure> {
+        let terrain = bake.terrain(&mut files)?;
+        terrain.tell_read();
+        let site = terrain.settle(&Asked::new(&self.raster, &self.places))?;
+        let (when, sunlight) = When::at(self, weather, site, UpAxis::Z)?;
+        let start = Instant::now();
+        let field = terrain.field()?;
+        let north = self.places.north.degrees();
+        let rise = self.places.placement.height / self.places.units.metres();
+        let is = |kinds: &[&str]| self.output.iter().any(|path| is_one_of(path, kinds));
+        let by_month = is(&["csv", "npz"]);
+        let job = FieldSunJob::new(&field, &sunlight, (rise, north), by_month)?;
+        let mut sensors = terrain.sensors(rise);
+        sensors.normals = job.normals();
+        let build_seconds = start.elapsed().as_secs_f64();
+        let done = match bake.is_whole() {
+            true => {
+                let (start, keeps) = (Instant::now(), is(&["npz"]) || self.hourly.is_some());
+                input::check_answers(&terrain.name, job.memory(keeps))?;
+                let progress = Progress::new(&terrain.name);
+                let found = job.whole(keeps, &progress);
+                progress.finish();
+                Done::whole(found?, start.elapsed().as_secs_f64())
+            }
+            false => bake.compute_cells(&job, &terrain.name)?,
+        };
+        let has_mesh = self.groups.is_some() || is(&["ply"]);
+        let ground = has_mesh.then(|| bake.ground(&mut files, None));
+        let ground = ground.transpose()?.map(|mut ground| {
+            if self.groups.is_some() {
+                ground.face(&sunlight.orientation);
+            }
+            let places = Places::new(&self.places, &mut ground, UpAxis::Z);
+            places.map(|places| (ground, places))
         });
-        let groups = baked.as_ref().map(|baked| baked.write_all(bake.outputs));
-        let groups = groups.transpose()?.flatten();
-        let mean = |shown| baked.as_ref()?.value(shown)?.mean();
+        let ground = ground.transpose()?;
+        let baked = Baked {
+            name: &terrain.name,
+            mesh: ground.as_ref().map(|(ground, places)| (ground, places)),
+            terrain: Some(&terrain),
+            local: terrain.local(),
+            sensors: &sensors,
+            sunlight: &sunlight,
+            values: Vec::new(),
+            args: self,
+            when: &when,
+            weather: weather.map(|weather| &*weather.name),
+            up: UpAxis::Z,
+        };
+        let seconds = [terrain.load_seconds, build_seconds];
+        let directions = sunlight.suns.times.len() + sunlight.patches.len();
+        let rays = (directions * sensors.points.len()) as u64;
+        baked.end(bake, (field.triangles(), rays, seconds, begin), &done)
+    }
+
+    /// Light from the ground, if it is wanted.
+    fn reflected(&self, sensors: &Sensors, sunlight: &Sunlight) -> Option<Vec<f64>> {
+        let albedo = self.albedo?;
+        Some(sunlight.reflected(albedo, &sensors.normals, sensors.points.len()))
+    }
+}
+
+impl<'a> Baked<'a> {
+    /// Writes all files and the document, and says what was done.
+    fn end(
+        mut self,
+        bake: &Bake<'_>,
+        (triangles, rays, [load_seconds, build_seconds], begin): (usize, u64, [f64; 2], Instant),
+        done: &'a Done<SunFound>,
+    ) -> Result<(), Failure> {
+        let (sensors, sunlight) = (self.sensors, self.sunlight);
+        let mut groups = None;
+        if let Some(found) = &done.found {
+            let reflected = self.args.reflected(sensors, sunlight);
+            self.values = values::list(&found.values, reflected);
+            groups = self.write_all(bake.outputs, found)?;
+        }
         let shown = [Shown::Hours, Shown::SkyView, Shown::Direct, Shown::Diffuse];
-        let means @ [hours, view, direct, diffuse] = shown.map(mean);
-        let rays = baked.as_ref().map_or(0, |_| job.rays());
-        let suns = &sunlight.suns;
+        let means @ [hours, view, direct, diffuse] = shown.map(|shown| self.value(shown)?.mean());
+        let rays = if done.found.is_some() { rays } else { 0 };
+        let (suns, place) = (&sunlight.suns, &self.when.place);
         let total = begin.elapsed().as_secs_f64();
         let figures: &[Figure<'_>] = &[
             ("outputs", &bake.output_names()),
             ("shard", &bake.shard()),
-            ("triangles", &ground.mesh.indices.len()),
+            ("triangles", &triangles),
             ("sensors", &sensors.points.len()),
-            ("place", &weather.as_ref().map(|weather| &weather.name)),
-            ("latitude", &when.place.latitude),
-            ("longitude", &when.place.longitude),
-            ("timezone", &when.zone),
+            ("place", &self.weather),
+            ("latitude", &place.latitude),
+            ("longitude", &place.longitude),
+            ("timezone", &self.when.zone),
             ("steps", &sunlight.steps()),
             ("suns", &suns.times.len()),
             ("step_hours", suns.hours.first().unwrap_or(&0.0)),
@@ -282,38 +383,46 @@ impl Baking for SunArgs {
             ("mean_direct_kwh_m2", &direct),
             ("mean_diffuse_kwh_m2", &diffuse),
             ("groups", &groups),
-            ("load_seconds", &ground.loaded.seconds),
-            ("build_seconds", &ground.build_seconds),
+            ("load_seconds", &load_seconds),
+            ("build_seconds", &build_seconds),
             ("trace_seconds", &done.seconds),
             ("total_seconds", &total),
         ];
-        let name = ("antumbra.sun/1", &*ground.loaded.scene.name);
-        bake.document(name, figures, (&done, &format!("; {total:.2} s")))?;
-        if let Some(baked) = &baked {
-            ground.tell("");
-            baked.tell(means);
-            bake.end("rays", rays, &done);
+        let name = ("antumbra.sun/1", self.name);
+        bake.document(name, figures, (done, &format!("; {total:.2} s")))?;
+        if let Some(found) = &done.found {
+            match (self.terrain, self.mesh) {
+                (Some(terrain), _) => terrain.tell(),
+                (None, Some((ground, _))) => ground.tell(""),
+                (None, None) => {}
+            }
+            self.tell(found, means);
+            bake.end("rays", rays, done);
         }
         Ok(())
     }
-}
 
-impl SunArgs {
-    /// Light from the ground, if it is wanted.
-    fn reflected(&self, sensors: &Sensors, sunlight: &Sunlight) -> Option<Vec<f64>> {
-        let albedo = self.albedo?;
-        Some(sunlight.reflected(albedo, &sensors.normals, sensors.points.len()))
+    /// The mesh and the places on it.
+    fn mesh(&self) -> Result<(&'a Ground, &'a Places), Failure> {
+        let reason = "a height raster has no mesh: take --grid instead of --cells";
+        self.mesh.ok_or_else(|| Failure::Usage(reason.into()))
     }
-}
 
-impl<'a> Baked<'a> {
     /// Writes all files, during which no signal ends the program. Returns the rows of `--groups`.
-    fn write_all(&self, outputs: &[PathBuf]) -> Result<Option<Vec<Row>>, Failure> {
+    fn write_all(
+        &self,
+        outputs: &[PathBuf],
+        found: &SunFound,
+    ) -> Result<Option<Vec<Row>>, Failure> {
         let _writing = interrupt::writing();
         let args = self.args;
-        outputs.iter().try_for_each(|path| self.write(path))?;
-        args.hourly.iter().try_for_each(|path| self.hourly(path))?;
-        args.frames.iter().try_for_each(|path| self.frames(path))?;
+        outputs
+            .iter()
+            .try_for_each(|path| self.write(path, found))?;
+        let mut hourly = args.hourly.iter();
+        hourly.try_for_each(|path| self.hourly(path, found))?;
+        let mut frames = args.frames.iter();
+        frames.try_for_each(|path| self.frames(path, found))?;
         args.groups
             .as_ref()
             .map(|path| self.groups(path))

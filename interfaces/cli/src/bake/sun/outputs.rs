@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use antumbra_bake::{Array, Entry, Label, Layout, SunlightClass};
+use antumbra_bake::{Array, Entry, Label, Layout, SunFound, SunlightClass};
 use antumbra_raster::Quantity;
 
 use super::Baked;
@@ -13,36 +13,42 @@ use crate::exit::Failure;
 
 impl Baked<'_> {
     /// Writes one file.
-    pub fn write(&self, path: &Path) -> Result<(), Failure> {
+    pub fn write(&self, path: &Path, found: &SunFound) -> Result<(), Failure> {
         let (args, sensors) = (self.args, self.sensors);
         let shown = self.shown();
         let &Value { name, unit, .. } = shown;
         match Format::of_sensors(path)? {
-            Format::Csv => self.csv(path),
-            Format::Npz => self.npz(path),
+            Format::Csv => self.csv(path, found),
+            Format::Npz => self.npz(path, found),
             Format::Picture => {
                 let time = (args.show != Shown::SkyView).then(|| self.period());
                 let words = self.words((shown.title, shown.unit_on_maps()), time);
-                let plan = self.plan();
+                let plan = self.plan()?;
                 map::Sheet::new(&args.map, &plan, sensors)?.write(path, &words, &shown.singles())
             }
             Format::Raster => {
-                let values = (sensors, &shown.singles()[..]);
-                let place = (args.raster.crs.as_ref(), args.places.units.metres());
+                let (values, crs) = (shown.singles(), args.raster.crs.as_ref());
                 let quantity = Quantity { name, unit };
-                raster::write(path, self.ground, values, place, (self.up, quantity))
+                if let Some(terrain) = self.terrain {
+                    let values = terrain.spread(&values);
+                    return raster::write_values(path, &terrain.grid(crs), &values, quantity);
+                }
+                let place = (crs, args.places.units.metres());
+                let (ground, _) = self.mesh()?;
+                raster::write(path, ground, (sensors, &values), place, (self.up, quantity))
             }
             Format::Ply | Format::Glb => {
                 let directions = self.sunlight.patch_directions();
                 let up = directions.last().copied().unwrap_or_default();
-                let mesh = (&self.ground.mesh, self.ground.local);
+                let (ground, _) = self.mesh()?;
+                let mesh = (&ground.mesh, self.local);
                 let values = (name, &shown.singles()[..]);
                 files::coloured(path, values, sensors, mesh, (up, args.map.colours()))
             }
         }
     }
 
-    fn csv(&self, path: &Path) -> Result<(), Failure> {
+    fn csv(&self, path: &Path, found: &SunFound) -> Result<(), Failure> {
         let (sensors, covered) = (self.sensors, &self.sunlight.suns.covered);
         let single = |value| {
             let Value { name, list, .. }: &Value<'_> = value;
@@ -60,15 +66,15 @@ impl Baked<'_> {
         let class = |&hours: &f64| SunlightClass::of_hours(hours).name().to_owned();
         let classes = self.args.en17037.then(|| Label {
             column: "en17037".into(),
-            values: self.found.values.hours.iter().map(class).collect(),
+            values: found.values.hours.iter().map(class).collect(),
         });
-        let places = (sensors, &sensors.normals[..], self.ground.local);
+        let places = (sensors, &sensors.normals[..], self.local);
         files::table(path, places, classes.as_slice(), &columns)
     }
 
-    fn npz(&self, path: &Path) -> Result<(), Failure> {
+    fn npz(&self, path: &Path, found: &SunFound) -> Result<(), Failure> {
         let (sensors, suns) = (self.sensors, &self.sunlight.suns);
-        let (suns_seen, sky_seen) = (&self.found.suns_seen, &self.found.sky_seen);
+        let (suns_seen, sky_seen) = (&found.suns_seen, &found.sky_seen);
         let azimuths: Vec<f64> = suns.positions.iter().map(|sun| sun.azimuth).collect();
         let elevations: Vec<f64> = suns.positions.iter().map(|sun| sun.elevation).collect();
         let counts = [suns_seen.columns() as u64, sky_seen.columns() as u64];
@@ -86,7 +92,7 @@ impl Baked<'_> {
             Entry::new(&months[value], Array::F64(self.values[value].by_month)).columns(12)
         };
         let mut entries = vec![
-            Entry::new("points", Array::Places(&sensors.points, self.ground.local)),
+            Entry::new("points", Array::Places(&sensors.points, self.local)),
             Entry::new("normals", Array::Points(&sensors.normals)),
             number(0),
             by_month(0),

@@ -1,6 +1,6 @@
 //! What `sun` says at the end: what was found, what is covered, and what is probably wrong with the model.
 
-use antumbra_bake::{Orientation, Sensors, Surface};
+use antumbra_bake::{Orientation, Sensors, SunFound, Surface};
 use antumbra_lab::count;
 
 use super::Baked;
@@ -12,7 +12,7 @@ const DARK: f64 = 0.05;
 
 impl Baked<'_> {
     /// Says what was found, with means of hours, sky view, direct and diffuse irradiation.
-    pub fn tell(&self, [hours, view, direct, diffuse]: [Option<f64>; 4]) {
+    pub fn tell(&self, found: &SunFound, [hours, view, direct, diffuse]: [Option<f64>; 4]) {
         let (args, sunlight, place) = (self.args, self.sunlight, &self.when.place);
         let zones = match self.when.zones {
             [winter, summer] if winter < summer => format!("UTC{winter:+} and {summer:+}"),
@@ -42,7 +42,7 @@ impl Baked<'_> {
                 "mean: {direct:.1} kWh/m² from the sun, {diffuse:.1} from the sky"
             ));
         }
-        let values = &self.found.values;
+        let values = &found.values;
         let without = values.hours.iter().filter(|x| x.is_nan()).count();
         if without > 0 {
             tell(format_args!(
@@ -50,15 +50,15 @@ impl Baked<'_> {
                 count(without as u64)
             ));
         }
-        self.tell_dark();
-        if args.places.sensors.is_some() {
+        self.tell_dark(&values.sky_open);
+        if let (Some((ground, _)), true) = (self.mesh, args.places.sensors.is_some()) {
             let plan = &sunlight.orientation;
-            warn_inside(self.ground, self.sensors, &values.sky_open, plan);
+            warn_inside(ground, self.sensors, &values.sky_open, plan);
         }
     }
 
     /// Says what is covered, and warns of sensors that see nothing of the sky although nobody would expect it.
-    fn tell_dark(&self) {
+    fn tell_dark(&self, sky_open: &[f64]) {
         let sensors = self.sensors;
         if !sensors.covered.is_empty() {
             tell(format_args!(
@@ -66,7 +66,7 @@ impl Baked<'_> {
                 count(sensors.covered.len() as u64),
             ));
         }
-        let is_dark = |index: &usize| self.found.values.sky_open[*index] == 0.0;
+        let is_dark = |index: &usize| sky_open[*index] == 0.0;
         let dark: Vec<usize> = (0..sensors.points.len()).filter(is_dark).collect();
         let kinds = sensors.label("surface");
         if let (Some(kinds), Some(_)) = (kinds, self.args.places.placement.surfaces) {

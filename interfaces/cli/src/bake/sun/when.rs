@@ -9,10 +9,8 @@ use antumbra_bake::{
 use antumbra_raster::Site;
 
 use super::SunArgs;
-use crate::bake::ground::Ground;
 use crate::bake::map;
 use crate::bake::raster::is_raster;
-use crate::bake::site::Asked;
 use crate::exit::{Failure, say};
 use crate::input;
 
@@ -88,14 +86,13 @@ pub struct When {
 }
 
 impl When {
-    /// Place, clocks, sun and sky of a scene.
+    /// Place, clocks, sun and sky of a scene that is here on the earth, if that is known.
     pub fn at(
         args: &SunArgs,
         weather: Option<&Weather>,
-        ground: &Ground,
+        site: Option<Site>,
         up: UpAxis,
     ) -> Result<(Self, Sunlight), Failure> {
-        let site = Asked::new(&args.raster, &args.places).of(&ground.loaded, up)?;
         let when = Self::new(args, weather, site)?;
         let steps = when.steps(args, weather)?;
         let sunlight = when.sunlight(args, steps, up)?;

@@ -6,6 +6,7 @@ use antumbra_bake::{Clock, Moment, Place};
 
 use super::Baked;
 use crate::bake::map::{self, Plan, Words};
+use crate::exit::Failure;
 
 impl Baked<'_> {
     /// Words on maps of a value at a time.
@@ -31,7 +32,7 @@ impl Baked<'_> {
         }
         subtitle.extend([map::place(latitude, longitude), clock]);
         subtitle.extend(self.weather.map(str::to_owned));
-        let mut title = format!("{quantity}, {}", self.ground.loaded.scene.name);
+        let mut title = format!("{quantity}, {}", self.name);
         if let Some(name) = &args.places.only {
             title += &format!(", {name}");
         }
@@ -47,18 +48,19 @@ impl Baked<'_> {
     }
 
     /// Where the grid of maps is.
-    pub fn plan(&self) -> Plan<'_> {
+    pub fn plan(&self) -> Result<Plan<'_>, Failure> {
+        let (ground, sensors) = self.mesh()?;
         let places = &self.args.places;
         let metres = places.units.metres();
-        Plan {
-            ground: self.ground,
-            bvh: self.places.bvh(self.ground),
-            orientation: &self.places.plan,
+        Ok(Plan {
+            ground,
+            bvh: sensors.bvh(ground),
+            orientation: &sensors.plan,
             up: self.up,
             cell: places.grid.unwrap_or_default() / metres,
             north: places.seen_from.is_none().then_some(places.north.degrees()),
             metres: Some(metres),
-        }
+        })
     }
 
     /// The time that values are of, as maps write it.

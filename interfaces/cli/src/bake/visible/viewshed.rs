@@ -5,7 +5,6 @@ use std::time::Instant;
 use antumbra_bake::{
     Curvature, HeightField, Limits, Mesh, Observer, Orientation, Sensors, ViewshedJob, Viewsheds,
 };
-use antumbra_lab::count;
 
 use super::lines::{self, Ends};
 use super::{SEEN_BY, Sight, VisibleArgs};
@@ -15,7 +14,7 @@ use crate::bake::raster;
 use crate::bake::terrain::{Terrain, is_terrain};
 use crate::exit::{Failure, tell};
 use crate::output::Files;
-use crate::{input, interrupt, scenes};
+use crate::{input, interrupt};
 
 /// Whether a command wants the cells of a height raster. Rays serve the rest: other places, lines without their ends, and rasters
 /// on their side.
@@ -27,7 +26,7 @@ pub fn is_of_cells(args: &VisibleArgs) -> bool {
 /// Runs the command. `files` has all files but those that are read with the raster.
 pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
     let terrain = bake.terrain(&mut files)?;
-    tell_read(&terrain);
+    terrain.tell_read();
     terrain.settle(&super::asked(args))?;
     let start = Instant::now();
     let field = terrain.field()?;
@@ -52,8 +51,7 @@ pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), 
         ));
     }
     let done = bake.compute_cells(&job, &terrain.name)?;
-    let heights = terrain.heights.raster.values.iter();
-    let cells = heights.filter(|height| height.is_finite()).count();
+    let cells = terrain.cells().count();
     let counts = done.found.as_ref().map(Viewsheds::counts);
     if let (Some(found), Some(counts)) = (&done.found, &counts) {
         write(args, &terrain, &table, found, counts)?;
@@ -66,27 +64,7 @@ pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), 
         visible: counts.map(visible),
         seconds: [terrain.load_seconds, build_seconds],
     };
-    sight.end(args, bake, &done, || {
-        tell(format_args!(
-            "{}: {} cells, loaded in {:.2} s",
-            terrain.name,
-            count(cells as u64),
-            terrain.load_seconds
-        ));
-    })
-}
-
-/// Says what was read.
-fn tell_read(terrain: &Terrain) {
-    let [x, y, z] = terrain.extent.size().to_array().map(scenes::rounded);
-    let grid = &terrain.heights.raster.grid;
-    tell(format_args!(
-        "{}: {x} x {y} x {z} {} (x, y, z); z is up, as rasters of heights have it; {} x {} cells",
-        terrain.name,
-        scenes::unit(grid.crs.as_ref()),
-        grid.width,
-        grid.height
-    ));
+    sight.end(args, bake, &done, || terrain.tell())
 }
 
 /// Height that places lose per squared distance.
