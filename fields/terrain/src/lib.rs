@@ -9,6 +9,8 @@
 //! | which azimuths have such steps, and how much of the circle is each | [`Lattice`] | steps, degrees, weights |
 //! | which cells get light from a direction | [`Shadows::lit`] | a bit for each cell |
 //! | which cells does an observer see | [`Viewer::sees`] | a bit for each cell |
+//! | from which height above ground does an observer see them | [`Viewer::target_heights`] | a number for each cell |
+//! | how steep is the line of sight | [`Viewer::elevation`] | degrees of one cell |
 //!
 //! The share of the sky that level ground receives light from, with 16 azimuths, is the mean of the squared cosines of horizons:
 //!

@@ -1,17 +1,21 @@
 //! Viewsheds: the cells that an observer sees, exactly and without rays.
 //!
 //! - `view`: the field by rows and by columns;  `sector`: a sector of the plan, line by line;  `envelope`: the edges that were passed, as
-//!   the eye sees them
+//!   the eye sees them;  `raised`: the heights from which cells are seen
 
 mod envelope;
+mod raised;
 mod sector;
 mod view;
 
 use rayon::prelude::*;
 
-use crate::{Error, HeightField, Observer, memory};
-use sector::{SECTORS, Sector};
+use crate::{Error, HeightField, Observer, degrees, memory};
+use sector::{Run, SECTORS, Sector};
 use view::{Side, Turned};
+
+/// Number of sectors around an eye.
+const ALL_SECTORS: usize = Side::ALL.len() * SECTORS;
 
 /// What counts as seen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,18 +87,17 @@ impl<'a> Viewer<'a> {
         if !observer.is_finite() || self.field().buries(observer) {
             return Ok(seen);
         }
-        self.see_own_cell(observer, &mut seen);
-        let sectors: Vec<_> = Side::ALL
-            .into_iter()
-            .flat_map(|side| (0..SECTORS).map(move |i| (side, i)))
+        if let Some(cell) = self.own_cell(observer) {
+            seen[cell / 64] |= 1 << (cell % 64);
+        }
+        let sector = |index| self.sector(observer, limits, index);
+        let found: Vec<Vec<Run>> = (0..ALL_SECTORS)
+            .into_par_iter()
+            .map(|index| sector(index).sweep(Vec::new()))
             .collect();
-        let found: Vec<_> = sectors
-            .par_iter()
-            .map(|&(side, index)| Sector::new(&self.0, observer, limits, side, index).sweep())
-            .collect();
-        for (&(side, _), parts) in sectors.iter().zip(found) {
-            let view = self.0.view(side, observer.place);
-            for (line, range) in parts {
+        for (index, runs) in found.into_iter().enumerate() {
+            let view = sector(index).view;
+            for (line, range) in runs {
                 for at in range {
                     let cell = view.cell(line as usize, at as usize);
                     seen[cell / 64] |= 1 << (cell % 64);
@@ -105,19 +108,43 @@ impl<'a> Viewer<'a> {
         Ok(seen)
     }
 
-    /// Marks the cell that the observer is exactly above.
-    fn see_own_cell(&self, observer: &Observer, seen: &mut [u64]) {
+    /// Elevation of the line from the eye of an observer to the target over a cell, in degrees, whether it is seen or not: from -90 below
+    /// the eye over 0 on its level to 90. NaN without data, and where the target is the eye.
+    ///
+    /// # Panics
+    /// If there is no such cell.
+    pub fn elevation(&self, observer: &Observer, limits: &Limits, cell: usize) -> f32 {
+        let [east, north, up] = self.way(observer, limits, cell);
+        degrees(up / (east * east + north * north).sqrt())
+    }
+
+    /// Way to the east, to the north and up from an eye to the target over a cell.
+    fn way(&self, observer: &Observer, limits: &Limits, cell: usize) -> [f64; 3] {
+        let field = self.field();
+        let [width, _] = field.size();
+        let [x, y] = observer.place;
+        let [column, row] = [cell % width, cell / width].map(|at| at as f64);
+        let [east, north] = field.along([column - x, row - y]);
+        let drop = limits.drop * (east * east + north * north);
+        let up = field.heights()[cell] + limits.target - drop - observer.height;
+        [east, north, up]
+    }
+
+    /// One of all sectors around an eye.
+    fn sector(&self, observer: &Observer, limits: &Limits, index: usize) -> Sector<'_> {
+        let (side, index) = (Side::ALL[index / SECTORS], index % SECTORS);
+        Sector::new(&self.0, observer, limits, side, index)
+    }
+
+    /// The cell that the observer is exactly above, if it has data.
+    fn own_cell(&self, observer: &Observer) -> Option<usize> {
         let [width, height] = self.field().size();
         let [column, row] = observer.place;
         let is_centre = column.fract() == 0.0 && row.fract() == 0.0;
         let is_inside =
             (0.0..width as f64).contains(&column) && (0.0..height as f64).contains(&row);
-        if is_centre && is_inside {
-            let cell = row as usize * width + column as usize;
-            if self.field().heights()[cell].is_finite() {
-                seen[cell / 64] |= 1 << (cell % 64);
-            }
-        }
+        let cell = (is_centre && is_inside).then(|| row as usize * width + column as usize)?;
+        self.field().heights()[cell].is_finite().then_some(cell)
     }
 
     /// Removes cells that are behind the surface of an observer.
@@ -125,16 +152,10 @@ impl<'a> Viewer<'a> {
         if observer.normal == [0.0; 3] {
             return;
         }
-        let [width, _] = self.field().size();
         for (index, word) in seen.iter_mut().enumerate() {
             let seen = *word;
             for bit in (0..64).filter(|bit| seen >> bit & 1 != 0) {
-                let cell = 64 * index + bit;
-                let at = [cell % width, cell / width].map(|at| at as f64);
-                let [x, y] = observer.place;
-                let [east, north] = self.field().along([at[0] - x, at[1] - y]);
-                let drop = limits.drop * (east * east + north * north);
-                let up = self.field().heights()[cell] + limits.target - drop - observer.height;
+                let [east, north, up] = self.way(observer, limits, 64 * index + bit);
                 let [a, b, c] = observer.normal;
                 let is_apart = [east, north, up] != [0.0; 3];
                 if is_apart && a * east + b * north + c * up <= 0.0 {

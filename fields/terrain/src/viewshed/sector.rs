@@ -33,12 +33,38 @@ const BESIDE: f64 = 3.0;
 /// Lines from the eye from which on blocks may be left out.
 const FAR: f64 = 8.0;
 
+/// What a sweep notes of the cells of its sector.
+pub trait Note {
+    /// Whether cells of blocks that are left out are noted too.
+    const ALL: bool;
+
+    /// Notes a cell that is in range, at a place of a line. Its target lacks so much to be seen, as a slope: 0 or less if it is seen,
+    /// NaN without data.
+    fn cell(&mut self, sector: &Sector<'_>, line: usize, at: usize, lacks: f64);
+}
+
 /// Cells of a line.
 pub type Run = (u32, Range<u32>);
 
+/// Runs of cells that are seen.
+impl Note for Vec<Run> {
+    const ALL: bool = false;
+
+    #[inline(always)]
+    fn cell(&mut self, _: &Sector<'_>, line: usize, at: usize, lacks: f64) {
+        if lacks <= 0.0 {
+            let (line, at) = (line as u32, at as u32);
+            match self.last_mut() {
+                Some((before, run)) if *before == line && run.end == at => run.end += 1,
+                _ => self.push((line, at..at + 1)),
+            }
+        }
+    }
+}
+
 /// A part of the plan that is swept.
 pub struct Sector<'a> {
-    view: View<'a>,
+    pub view: View<'a>,
     height: f64,
     /// Reciprocal of the unit of heights, which is the side of a cell.
     scale: f64,
@@ -96,9 +122,8 @@ impl<'a> Sector<'a> {
         }
     }
 
-    /// Runs of cells that are seen.
-    pub fn sweep(&self) -> Vec<Run> {
-        let mut runs = Vec::new();
+    /// Sweeps the sector, and notes its cells.
+    pub fn sweep<N: Note>(&self, mut note: N) -> N {
         let mut horizon = Horizon::new(self.ends[0] - BEYOND, self.ends[1] + BEYOND);
         let (mut before, mut now) = (Cells::default(), Cells::default());
         let mut spans = Vec::new();
@@ -119,7 +144,15 @@ impl<'a> Sector<'a> {
                 0 => {}
                 _ => self.raise_around_eye(&mut horizon, line),
             }
-            self.look(&horizon, &spans, &now, &mut runs);
+            let reach = now.first..now.first + now.points.len();
+            let looked = match N::ALL {
+                true => std::slice::from_ref(&reach),
+                false => &spans,
+            };
+            if N::ALL {
+                self.project(&reach, &mut now);
+            }
+            self.look(&horizon, looked, &now, &mut note);
             horizon.raise(spans.iter().flat_map(|span| {
                 let (first, points) = now.within(span);
                 let pairs = (first..).zip(points.windows(2));
@@ -130,7 +163,7 @@ impl<'a> Sector<'a> {
             }));
             std::mem::swap(&mut before, &mut now);
         }
-        runs
+        note
     }
 
     /// A cell as the eye sees it: distances ahead, to the side and up, in sides of cells.
@@ -334,35 +367,30 @@ impl<'a> Sector<'a> {
         (from < to).then(|| Edge::new(mix(from), mix(to)))
     }
 
-    /// Notes the cells of a line that are seen.
-    fn look(&self, horizon: &Horizon, spans: &[Range<usize>], cells: &Cells, runs: &mut Vec<Run>) {
+    /// Notes cells of a line.
+    fn look<N: Note>(
+        &self,
+        horizon: &Horizon,
+        spans: &[Range<usize>],
+        cells: &Cells,
+        note: &mut N,
+    ) {
         let [start, end] = self.ends;
         let x = cells.line as f64 - self.view.eye[0];
         let raised = self.target / x;
         let mut heights = horizon.heights();
         for span in spans {
             let (first, points) = cells.within(span);
-            let mut run: Option<Range<u32>> = None;
             for (at, point) in (first..).zip(points) {
                 let is_inside = match point.m.abs() == 1.0 {
                     true => self.has_diagonals && (start..=end).contains(&point.m),
                     false => (start..end).contains(&point.m),
                 };
-                let is_seen = is_inside
-                    && point.q + raised >= heights.at(point.m) - GRAZING
-                    && self.is_near(x, at as f64 - self.view.eye[1]);
-                let at = at as u32;
-                run = match (run, is_seen) {
-                    (Some(run), true) => Some(run.start..at + 1),
-                    (None, true) => Some(at..at + 1),
-                    (Some(run), false) => {
-                        runs.push((cells.line as u32, run));
-                        None
-                    }
-                    (None, false) => None,
-                };
+                if is_inside && self.is_near(x, at as f64 - self.view.eye[1]) {
+                    let lacks = heights.at(point.m) - GRAZING - (point.q + raised);
+                    note.cell(self, cells.line, at, lacks);
+                }
             }
-            runs.extend(run.map(|run| (cells.line as u32, run)));
         }
     }
 
@@ -435,9 +463,9 @@ mod tests {
                 for side in Side::ALL {
                     for index in 0..SECTORS {
                         let mut sector = Sector::new(&turned, &observer, &limits, side, index);
-                        let found = sector.sweep();
+                        let found = sector.sweep(Vec::<Run>::new());
                         sector.far = f64::INFINITY;
-                        let all = sector.sweep();
+                        let all = sector.sweep(Vec::<Run>::new());
                         let cells = |runs: &[Run]| {
                             let cells = runs
                                 .iter()
