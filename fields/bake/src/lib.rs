@@ -27,6 +27,7 @@
 //! | how much energy does each point receive from the sun and the sky | [`SunJob`], [`run`] | [`SunValues`] |
 //! | how much of the light of a surface arrives at others | [`view_factors`], [`ViewFactorJob`] | `f64`, surfaces x surfaces |
 //! | which cells of a height raster does each observer see | [`ViewshedJob`], [`run`] | [`Viewsheds`] |
+//! | how high must something on a cell be until an observer sees it | [`TargetHeightJob`], [`run`] | a number for each cell |
 //! | how high is the horizon in each azimuth | [`HorizonJob`], [`run`] | `f32`, points x azimuths |
 //! | how high is the horizon of each cell of a height raster | [`FieldHorizonJob`], [`run`] | `f32`, directions x cells |
 //! | which points see each other | [`sees_points`], [`sees_each_other`] | [`BitMatrix`], points x points |
@@ -77,7 +78,7 @@
 //!   bit per answer;  `directions`: directions over a hemisphere;  `curvature`: lines of sight over a round earth
 //! - `sun`: `position`: where the sun is;  `sky`, `perez`: the sky in patches, and its light;  `moment`, `clock`, `epw`: dates, time
 //!   zones, weather files;  `sunlight`: the job of a period;  `exposure`, `hourly`, `measures`: sums, steps and classes
-//! - `rasters`: `viewshed`, `field_horizon`: one job each of a height raster, which `antumbra-terrain` answers without rays
+//! - `rasters`: `viewshed`, `field_horizon`: jobs of height rasters, which `antumbra-terrain` answers without rays
 //! - `files`: `npz`: arrays for numpy;  `ply`, `glb`: meshes with a value at every vertex
 //! - `vector`, `orientation`: vectors, and where up and north are in a scene
 //! - `error`: why there is no result

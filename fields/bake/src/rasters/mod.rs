@@ -6,4 +6,4 @@ pub(crate) mod viewshed;
 
 pub use field_horizon::FieldHorizonJob;
 pub use field_sun::FieldSunJob;
-pub use viewshed::{ViewshedJob, Viewsheds};
+pub use viewshed::{TargetHeightJob, ViewshedJob, Viewsheds};

@@ -36,6 +36,19 @@ impl<'a> ViewshedJob<'a> {
     fn cells(&self) -> usize {
         self.viewer.field().heights().len()
     }
+
+    /// Least [elevation](Viewer::elevation) in degrees of all lines from observers to the targets that they see, for each cell; NaN where
+    /// none of them sees the cell. `found` are the viewsheds of this job.
+    pub fn elevations(&self, found: &Viewsheds) -> Vec<f32> {
+        let mut least = vec![f32::NAN; self.cells()];
+        for (index, observer) in self.observers.iter().enumerate() {
+            for cell in found.seen(index).flatten() {
+                let elevation = self.viewer.elevation(observer, &self.limits, cell);
+                least[cell] = least[cell].min(elevation);
+            }
+        }
+        least
+    }
 }
 
 impl Job for ViewshedJob<'_> {
@@ -88,6 +101,69 @@ impl Job for ViewshedJob<'_> {
     }
 }
 
+/// Groups of observers that [`TargetHeightJob`] answers together.
+const GROUPS: usize = 16;
+
+/// Job of the least height above ground from which one of the observers sees each cell, as [`Viewer::target_heights`] says.
+///
+/// Its items are at most 16 groups of observers, because the answers of an item are as many as cells, and are kept.
+pub struct TargetHeightJob<'a>(pub ViewshedJob<'a>);
+
+impl TargetHeightJob<'_> {
+    /// Heights of all cells, in 4 bytes a cell. The job itself takes 8 more for each group.
+    ///
+    /// # Errors
+    /// [`Error::NoMemory`], [`Error::Cancelled`].
+    pub fn heights(&self, monitor: &dyn Monitor) -> Result<Vec<f32>, Error> {
+        self.of(self.0.observers, monitor)
+    }
+
+    fn of(&self, observers: &[Observer], monitor: &dyn Monitor) -> Result<Vec<f32>, Error> {
+        let ViewshedJob { viewer, limits, .. } = &self.0;
+        Ok(viewer.target_heights(observers, limits, monitor)?)
+    }
+
+    fn groups(&self) -> std::slice::Chunks<'_, Observer> {
+        let observers = self.0.observers;
+        observers.chunks(observers.len().div_ceil(GROUPS).max(1))
+    }
+}
+
+impl Job for TargetHeightJob<'_> {
+    type Found = Vec<f32>;
+    type Number = f32;
+
+    const NAME: &'static str = "target-height/1";
+
+    fn size(&self) -> Size {
+        let cells = self.0.cells();
+        Size::each(self.groups().len(), cells as u64, cells)
+    }
+
+    fn identify(&self, key: &mut Key) {
+        self.0.identify(key);
+    }
+
+    fn answers(&self, _: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers<Self> {
+        let mut all = Vec::new();
+        for group in self.groups().skip(items.start).take(items.len()) {
+            let heights = self.of(group, monitor)?;
+            memory::grow(&mut all, "heights", heights.len())?;
+            all.extend(heights);
+        }
+        Ok(all)
+    }
+
+    fn found(&self, numbers: Vec<f32>) -> Result<Vec<f32>, Error> {
+        let mut least = self.of(&[], &())?;
+        for heights in numbers.chunks_exact(least.len()) {
+            let pairs = least.iter_mut().zip(heights);
+            pairs.for_each(|(least, height)| *least = least.min(*height));
+        }
+        Ok(least)
+    }
+}
+
 /// The cells that each observer sees.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Viewsheds {
@@ -114,6 +190,12 @@ impl Viewsheds {
             at += length;
             (index % 2 == 1 && length > 0).then_some(from..at)
         })
+    }
+
+    /// Number of pairs of a cell and an observer that sees it.
+    pub fn count(&self) -> u64 {
+        let runs = (0..self.observers()).flat_map(|observer| self.seen(observer));
+        runs.map(|run| run.len() as u64).sum()
     }
 
     /// Number of observers that see each cell.

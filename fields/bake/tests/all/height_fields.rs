@@ -2,8 +2,8 @@
 
 use antumbra::{Bvh, Recipe};
 use antumbra_bake::{
-    EARTH_RADIUS, HeightField, Key, Limits, Observer, Part, REFRACTION, ViewshedJob, Viewsheds,
-    Work, run,
+    EARTH_RADIUS, HeightField, Key, Limits, Observer, Part, REFRACTION, TargetHeightJob,
+    ViewshedJob, Viewsheds, Work, run,
 };
 use antumbra_raster::{Grid, Raster};
 use antumbra_terrain::Error;
@@ -397,6 +397,64 @@ fn shares_and_threads_have_the_same_bits() {
                 && cells.next().is_none()
         );
     }
+}
+
+#[test]
+fn shares_have_the_least_heights_and_angles_of_all_observers() {
+    let mut case = Case::level(hills([50, 40], PLAIN, 0.05, 3));
+    case.target = 1.5;
+    // More than there are groups, so that some groups have several.
+    let observers: Vec<Observer> = (0..40)
+        .filter_map(|i| case.observer([f64::from(i) * 1.2, f64::from(i) * 0.9], 0.3))
+        .collect();
+    assert!(observers.len() > 32);
+    let field = case.field();
+    let job = TargetHeightJob(case.job(&field, &observers));
+    let whole = job.heights(&()).expect("heights");
+    let bits = |heights: &[f32]| heights.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+    let key = Key::of(&job, |_| {});
+    let mut together = Work::new(&job, key, [0, 1], Vec::new());
+    for index in 0..3 {
+        let mut work = Work::new(&job, key, [index, 3], Vec::new());
+        while work.step(&tree(), &()).expect("a step") {}
+        let mut file = Vec::new();
+        work.write(&mut file).expect("bytes");
+        together
+            .add(Part::read(&file).expect("a part"))
+            .expect("the same job");
+    }
+    assert_eq!(bits(&together.finish().expect("all")), bits(&whole));
+    // Cells that nobody sees are those whose least height is above the target, and the others have the least of all angles.
+    let sheds = case.run(&observers);
+    let angles = case.job(&field, &observers).elevations(&sheds);
+    let mut wanted = vec![f32::NAN; angles.len()];
+    for (index, eye) in observers.iter().enumerate() {
+        for cell in sheds.seen(index).flatten() {
+            let [x, y] = [
+                (cell % 50) as f64 - eye.place[0],
+                eye.place[1] - (cell / 50) as f64,
+            ];
+            let up = case.raster.values[cell] + case.target - eye.height;
+            wanted[cell] = wanted[cell].min(up.atan2(x.hypot(y)).to_degrees() as f32);
+        }
+    }
+    let [mut seen, mut hidden] = [0; 2];
+    for (cell, count) in sheds.counts().into_iter().enumerate() {
+        let (angle, wanted) = (angles[cell], wanted[cell]);
+        assert_eq!(angle.is_nan(), count == 0);
+        assert!(
+            count == 0 || (angle - wanted).abs() < 1e-5,
+            "{angle}, not {wanted}"
+        );
+        if (whole[cell] - 1.5).abs() > 1e-6 {
+            assert_eq!(whole[cell] < 1.5, count > 0, "{cell}: {}", whole[cell]);
+            seen += usize::from(count > 0);
+            hidden += usize::from(whole[cell] > 1.5);
+        }
+    }
+    assert!(seen > 200 && hidden > 200, "{seen} seen, {hidden} hidden");
+    let pairs: u64 = sheds.counts().into_iter().map(u64::from).sum();
+    assert_eq!(sheds.count(), pairs);
 }
 
 #[test]

@@ -182,6 +182,15 @@ impl<T> Done<T> {
             checkpoint: None,
         }
     }
+
+    /// What `of` makes of the result.
+    pub fn map<U>(self, of: impl FnOnce(T) -> U) -> Done<U> {
+        Done {
+            found: self.found.map(of),
+            seconds: self.seconds,
+            checkpoint: self.checkpoint,
+        }
+    }
 }
 
 impl Bake<'_> {

@@ -144,6 +144,95 @@ fn a_viewshed_ends_at_the_wall_and_at_the_radius() {
 }
 
 #[test]
+fn heights_and_angles_of_a_wall_are_those_of_its_shadow() {
+    let place = place();
+    place.write("eyes.csv", "x,y\n600055,5339855\n600105,5339855\n");
+    let args = ["visible", "dem.tif", "eyes.csv", "--viewshed", "--eye", "2"];
+    let show = |more: &[&str]| place.run(&[&args[..], more].concat());
+    let run = show(&[
+        "--show", "height", "-o", "high.tif", "-o", "high.csv", "--json", "-",
+    ])
+    .expect(0);
+    let high = place.raster("high.tif");
+    let at = |values: &[f64], column: usize| values[40 * 14 + column];
+    let levels = place.raster("dem.tif").values;
+    let wall = (0..40)
+        .find(|&column| at(&levels, column) > at(&levels, 0))
+        .expect("a wall");
+    for column in 0..40 {
+        // The least of both lines over the eastern edge of the wall, or 0.
+        let least = [5, 10].map(|eye: usize| {
+            let edges = (wall..column).filter(|&edge| edge > eye);
+            let line = |edge: usize| {
+                let rise = at(&levels, edge) - (at(&levels, eye) + 2.0);
+                let share = (column - eye) as f64 / (edge - eye) as f64;
+                at(&levels, eye) + 2.0 + rise * share - at(&levels, column)
+            };
+            edges.map(line).fold(0.0, f64::max)
+        });
+        let [wanted, found] = [least[0].min(least[1]), at(&high.values, column)];
+        assert!(
+            (found - wanted).abs() < 1e-4,
+            "{column}: {found}, not {wanted}"
+        );
+    }
+    let about = run.json();
+    assert_eq!(about["show"], "height");
+    assert!(about["visible_pairs"].is_null());
+    assert!(!run.stderr.contains("see each other"), "{}", run.stderr);
+    let table = fs::read_to_string(place.path("high.csv")).expect("a table");
+    assert!(
+        table.starts_with("x,y,z,height\n600015,5339995,5,"),
+        "{table}"
+    );
+    // Cells of height 0 are those that somebody sees, and have an angle.
+    show(&["-o", "seen.npy"]).expect(0);
+    show(&["--show", "angle", "-o", "angle.tif"]).expect(0);
+    let (seen, angle) = (place.raster("seen.npy"), place.raster("angle.tif"));
+    for (cell, &height) in high.values.iter().enumerate() {
+        assert_eq!(height == 0.0, seen.values[cell] > 0.0, "{cell}");
+        assert_eq!(height == 0.0, !angle.values[cell].is_nan(), "{cell}");
+    }
+    // Five columns of 10 m to the east of the nearer eye, and the other one looks flatter.
+    let wanted = (-2.0_f64 / 50.0).atan().to_degrees();
+    assert!((at(&angle.values, 15) - wanted).abs() < 1e-5);
+    for index in ["0/2", "1/2"] {
+        let name = format!("{}.part", &index[..1]);
+        show(&["--show", "height", "--shard", index, "-o", &name]).expect(0);
+    }
+    place
+        .run(&["merge", "0.part", "1.part", "-o", "merged.tif"])
+        .expect(0);
+    let read = |name: &str| fs::read(place.path(name)).expect("a file");
+    assert_eq!(read("merged.tif"), read("high.tif"));
+    for (more, word) in [
+        (
+            &["--show", "height", "-o", "a.npz"][..],
+            "a.npz: --show height is written as tif, asc, npy or csv",
+        ),
+        (
+            &["--show", "angle", "-o", "a.tif", "--grid", "20"],
+            "--show angle is for the cells of a height raster",
+        ),
+        (
+            &["--show", "height", "-o", "a.tif", "--target", "2"],
+            "leave out --target",
+        ),
+        (
+            &["--show", "angle", "-o", "a.tif", "--lines", "l.csv"],
+            "--lines are of pairs",
+        ),
+    ] {
+        let run = show(more);
+        assert!(
+            run.code == 2 && run.stderr.contains(word),
+            "{more:?}: {}",
+            run.stderr
+        );
+    }
+}
+
+#[test]
 fn cells_that_are_seen_are_the_same_in_all_files() {
     let place = place();
     // The last eye is below the surface.

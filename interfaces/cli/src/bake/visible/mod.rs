@@ -11,7 +11,7 @@ use antumbra::{Aabb, LocalOrigin};
 use antumbra_bake::{Array, BitMatrix, Entry, Eyes, Orientation, Sensors, UpAxis, VisibilityJob};
 use antumbra_lab::count;
 use antumbra_raster::{Quantity, unit_name};
-use clap::{ArgGroup, Args};
+use clap::{ArgGroup, Args, ValueEnum};
 
 use super::command::{Bake, Baking, Done, Figure, Named};
 use super::files::{self, Column, Format};
@@ -28,11 +28,27 @@ use crate::json::Destination;
 use crate::output::{Files, text};
 use lines::Ends;
 
-/// Name of the value of viewsheds in files.
-pub const SEEN_BY: Quantity<'static> = Quantity {
-    name: "seen_by",
-    unit: "",
-};
+/// Value of the cells of a height raster.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Shown {
+    /// Number of observers that see the cell
+    SeenBy,
+    /// Least height above ground that an observer sees
+    Height,
+    /// Least elevation of lines of sight, in degrees
+    Angle,
+}
+
+impl Shown {
+    /// Name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::SeenBy => "seen_by",
+            Self::Height => "height",
+            Self::Angle => "angle",
+        }
+    }
+}
 
 /// Flags of `visible`.
 #[derive(Debug, Args)]
@@ -55,9 +71,16 @@ pub struct VisibleArgs {
     /// May be given several times. An .npz has the matrix as bits with the counts, a .csv the count of every point of A (of a
     /// viewshed: of every place), a .ply the points of A or the mesh in colours, and a .png, .svg or .pdf a map of
     /// --viewshed with --grid. Beside a .png is a .pgw, the world file for GIS programs. A .tif (GeoTIFF), .asc or .npy has the
-    /// counts in the cells of a --grid or of a scene that is a raster. A shard is a .part.
+    /// counts in the cells of a --grid, or the value of --show in the cells of a scene that is a raster. A shard is a .part.
     #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
+    /// Value of cells of a height raster
+    ///
+    /// seen-by is the number of observers that see a cell, height is how high a target must be above its ground until one of
+    /// the observers sees it: 0 where the ground itself is seen, and inf where no height helps. angle is the least elevation in
+    /// degrees of the lines of sight to the cell, which has no data where nobody sees it.
+    #[arg(long, value_name = "VALUE", value_enum, default_value_t = Shown::SeenBy, hide_possible_values = true, requires = "viewshed", help_heading = heading::OUTPUT)]
+    pub show: Shown,
     #[command(flatten)]
     pub map: MapArgs,
     #[command(flatten)]
@@ -130,6 +153,7 @@ impl Baking for VisibleArgs {
                 _ => {}
             }
         }
+        viewshed::check(self)?;
         self.map.check()?;
         let path = self.lines.as_deref();
         path.map_or(Ok(()), |path| lines::format(path).map(drop))
@@ -148,6 +172,13 @@ impl Baking for VisibleArgs {
     fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
         if viewshed::is_of_cells(self) {
             return viewshed::run(self, bake, files);
+        }
+        if self.show != Shown::SeenBy {
+            let show = self.show.name();
+            return Err(Failure::Usage(format!(
+                "--show {show} is for the cells of a height raster, without --grid, --margin and --up; \
+                 with --target, counts are of targets at one height"
+            )));
         }
         let ground = bake.ground(&mut files, self.curvature.then_some(self))?;
         let up = ground.up(self.up)?;
@@ -331,7 +362,7 @@ fn write(
     let counts = matrix.count_rows();
     let values: Vec<f32> = counts.iter().map(|&count| count as f32).collect();
     let name = match points.is_viewshed {
-        true => SEEN_BY.name,
+        true => Shown::SeenBy.name(),
         false => "sees",
     };
     let rows = &points.rows;
@@ -408,7 +439,7 @@ pub struct Sight<'a> {
     pub triangles: usize,
     /// Numbers of points that have a row, and of those that have a column if these are others.
     pub counts: [Option<usize>; 2],
-    /// Pairs that see each other.
+    /// Pairs that see each other, if they were counted.
     pub visible: Option<u64>,
     /// Seconds of loading and of building.
     pub seconds: [f64; 2],
@@ -444,6 +475,7 @@ impl Sight<'_> {
             ("from", &from),
             ("to", &to),
             ("viewshed", &args.viewshed),
+            ("show", &args.show.name()),
             ("pairs", &pairs),
             ("visible_pairs", &self.visible),
             ("visible_share", &share),
@@ -453,13 +485,14 @@ impl Sight<'_> {
         ];
         if bake.document(("antumbra.visible/1", self.name), figures, (done, ""))? {
             tell_scene();
-            let visible = self.visible.unwrap_or_default();
-            tell(format_args!(
-                "{} of {} pairs see each other ({:.1} %)",
-                count(visible),
-                count(pairs),
-                100.0 * visible as f64 / (pairs as f64).max(1.0),
-            ));
+            if let Some(visible) = self.visible {
+                tell(format_args!(
+                    "{} of {} pairs see each other ({:.1} %)",
+                    count(visible),
+                    count(pairs),
+                    100.0 * visible as f64 / (pairs as f64).max(1.0),
+                ));
+            }
             bake.end("pairs", pairs, done);
         }
         Ok(())

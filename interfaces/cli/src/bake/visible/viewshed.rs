@@ -3,17 +3,20 @@
 use std::time::Instant;
 
 use antumbra_bake::{
-    Curvature, HeightField, Limits, Mesh, Observer, Orientation, Sensors, ViewshedJob, Viewsheds,
+    Curvature, HeightField, Limits, Mesh, Observer, Orientation, Sensors, TargetHeightJob,
+    ViewshedJob, Viewsheds,
 };
+use antumbra_raster::{Quantity, unit_name};
 
 use super::lines::{self, Ends};
-use super::{SEEN_BY, Sight, VisibleArgs};
-use crate::bake::command::Bake;
+use super::{Shown, Sight, VisibleArgs};
+use crate::bake::command::{Bake, Done};
 use crate::bake::files::{self, Column, Format};
 use crate::bake::raster;
 use crate::bake::terrain::{Terrain, is_terrain};
 use crate::exit::{Failure, tell};
 use crate::output::Files;
+use crate::progress::Progress;
 use crate::{input, interrupt};
 
 /// Whether a command wants the cells of a height raster. Rays serve the rest: other places, lines without their ends, and rasters
@@ -21,6 +24,25 @@ use crate::{input, interrupt};
 pub fn is_of_cells(args: &VisibleArgs) -> bool {
     let is_plain = args.grid.is_none() && args.margin.is_none();
     args.viewshed && is_plain && is_terrain(&args.scene, args.up)
+}
+
+/// Refuses what `--show` cannot be.
+pub fn check(args: &VisibleArgs) -> Result<(), Failure> {
+    let show = args.show.name();
+    if args.show == Shown::SeenBy {
+        return Ok(());
+    }
+    if args.lines.is_some() {
+        let reason = format!("--lines are of pairs that see each other: leave out --show {show}");
+        return Err(Failure::Usage(reason));
+    }
+    for path in &args.output {
+        if !matches!(Format::of_sensors(path)?, Format::Raster | Format::Csv) {
+            let reason = format!("--show {show} is written as tif, asc, npy or csv");
+            return Err(Failure::name(path, reason));
+        }
+    }
+    Ok(())
 }
 
 /// Runs the command. `files` has all files but those that are read with the raster.
@@ -37,6 +59,10 @@ pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), 
         drop: drop(args)?,
         range: args.radius.unwrap_or(f64::INFINITY),
     };
+    if args.show == Shown::Height && args.target > 0.0 {
+        let reason = "--show height is the height that targets need: leave out --target";
+        return Err(Failure::Usage(reason.into()));
+    }
     let job = ViewshedJob::new(&field, &table.observers, limits)?;
     let of = table.observers.len();
     let buried = table
@@ -50,21 +76,55 @@ pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), 
             args.from.display(),
         ));
     }
-    let done = bake.compute_cells(&job, &terrain.name)?;
+    let heights = &terrain.heights.raster.values;
     let cells = terrain.cells().count();
-    let counts = done.found.as_ref().map(Viewsheds::counts);
-    if let (Some(found), Some(counts)) = (&done.found, &counts) {
-        write(args, &terrain, &table, found, counts)?;
+    let mut seen = None;
+    let done = match args.show {
+        Shown::Height => raised(bake, &TargetHeightJob(job), &terrain.name)?,
+        show => bake.compute_cells(&job, &terrain.name)?.map(|found| {
+            let values = match show {
+                Shown::Angle => job.elevations(&found),
+                _ => counts(&found, heights),
+            };
+            seen = Some(found);
+            values
+        }),
+    };
+    if let Some(values) = &done.found {
+        write(args, &terrain, &table, values, seen.as_ref())?;
     }
-    let visible = |counts: Vec<u32>| counts.into_iter().map(u64::from).sum();
     let sight = Sight {
         name: &terrain.name,
         triangles: field.triangles(),
         counts: [Some(cells), Some(of)],
-        visible: counts.map(visible),
+        visible: seen.as_ref().map(Viewsheds::count),
         seconds: [terrain.load_seconds, build_seconds],
     };
     sight.end(args, bake, &done, || terrain.tell())
+}
+
+/// Numbers of observers that see each cell with data.
+fn counts(found: &Viewsheds, heights: &[f64]) -> Vec<f32> {
+    let known = |(count, height): (u32, &f64)| match height.is_nan() {
+        true => f32::NAN,
+        false => count as f32,
+    };
+    found.counts().into_iter().zip(heights).map(known).collect()
+}
+
+/// Heights from which cells are seen: at once, or by shares, which take more memory.
+fn raised(
+    bake: &Bake<'_>,
+    job: &TargetHeightJob<'_>,
+    name: &str,
+) -> Result<Done<Vec<f32>>, Failure> {
+    if !bake.is_whole() {
+        return bake.compute_cells(job, name);
+    }
+    let (start, progress) = (Instant::now(), Progress::new(name));
+    let heights = job.heights(&progress);
+    progress.finish();
+    Ok(Done::whole(heights?, start.elapsed().as_secs_f64()))
 }
 
 /// Height that places lose per squared distance.
@@ -123,30 +183,29 @@ impl Table {
     }
 }
 
-/// Writes all files.
+/// Writes all files: values of cells, and who sees them.
 fn write(
     args: &VisibleArgs,
     terrain: &Terrain,
     table: &Table,
-    found: &Viewsheds,
-    counts: &[u32],
+    values: &[f32],
+    seen: Option<&Viewsheds>,
 ) -> Result<(), Failure> {
     let _writing = interrupt::writing();
+    let name = args.show.name();
+    let unit = match args.show {
+        Shown::SeenBy => String::new(),
+        Shown::Height => args.units.known().map(unit_name).unwrap_or_default(),
+        Shown::Angle => "degrees".to_owned(),
+    };
+    let quantity = Quantity { name, unit: &unit };
     let raster = &terrain.heights.raster;
     let mut others = Vec::new();
     for path in &args.output {
         match Format::of_sensors(path)? {
             Format::Raster => {
-                let with_data = counts.iter().zip(&raster.values);
-                let values = with_data.map(|(&count, height)| match height.is_finite() {
-                    true => count as f32,
-                    false => f32::NAN,
-                });
-                let (grid, values) = (
-                    terrain.grid(args.raster.crs.as_ref()),
-                    values.collect::<Vec<_>>(),
-                );
-                raster::write_values(path, &grid, &values, SEEN_BY)?;
+                let grid = terrain.grid(args.raster.crs.as_ref());
+                raster::write_values(path, &grid, values, quantity)?;
             }
             format => others.push((path, format)),
         }
@@ -161,31 +220,29 @@ fn write(
     let triangles = (&surface.positions[..], &surface.indices[..]);
     mesh.push(triangles, &surface.normals, &[], false);
     let mut rows = Sensors::of_vertices(&mesh);
-    let seen = surface.cells.iter().map(|&cell| counts[cell as usize]);
-    let seen: Vec<u32> = seen.collect();
+    let values = surface.cells.iter().map(|&cell| values[cell as usize]);
+    let values: Vec<f32> = values.collect();
     for (path, format) in others {
-        match format {
-            Format::Csv => {
-                let column = Column::new(SEEN_BY.name, |row| f64::from(seen[row]));
+        match (format, seen) {
+            (Format::Csv, _) => {
+                let column = Column::new(name, |row| f64::from(values[row]));
                 files::table(path, (&rows, &[], local), &[], &[column])?;
             }
-            Format::Npz => {
-                let matrix = found.matrix(&surface.cells)?;
-                let counts: Vec<u64> = seen.iter().map(|&count| u64::from(count)).collect();
+            (Format::Npz, Some(seen)) => {
+                let matrix = seen.matrix(&surface.cells)?;
                 let observers = table.points.iter().map(|&point| local.local(point));
                 let observers: Vec<[f32; 3]> = observers.collect();
                 let places = [&rows.points[..], &observers];
-                super::npz(path, (true, places, local), &matrix, &counts)?;
+                super::npz(path, (true, places, local), &matrix, &matrix.count_rows())?;
             }
             _ => {
-                let values: Vec<f32> = seen.iter().map(|&count| count as f32).collect();
                 let level = ([0.0; 3], args.map.colours());
-                files::coloured(path, (SEEN_BY.name, &values), &rows, (&mesh, local), level)?;
+                files::coloured(path, (name, &values), &rows, (&mesh, local), level)?;
             }
         }
     }
-    if let Some(path) = &args.lines {
-        let matrix = found.matrix(&surface.cells)?;
+    if let (Some(path), Some(seen)) = (&args.lines, seen) {
+        let matrix = seen.matrix(&surface.cells)?;
         for point in &mut rows.points {
             point[2] = (f64::from(point[2]) + args.target) as f32;
         }
