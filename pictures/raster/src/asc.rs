@@ -18,10 +18,11 @@ struct Header {
     no_data: Option<f64>,
 }
 
-/// Reads a grid; `check` refuses a size before there is memory for it.
+/// Reads a grid; `check` refuses one before there is memory for it. Marks of cells without data stay if it is to be `is_raw`.
 pub fn read(
     bytes: &[u8],
-    check: impl Fn([usize; 2]) -> Result<(), String>,
+    is_raw: bool,
+    check: impl Fn(&Grid) -> Result<(), String>,
 ) -> Result<Raster, String> {
     let text = std::str::from_utf8(bytes).map_err(|_| "it is no text")?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -43,7 +44,8 @@ pub fn read(
         lines.next();
     }
     let grid = header.grid()?;
-    check([grid.width, grid.height])?;
+    check(&grid)?;
+    let no_data = header.no_data.filter(|_| !is_raw);
     let count = grid.width * grid.height;
     let mut values = Vec::new();
     values
@@ -59,7 +61,7 @@ pub fn read(
             }
             // Marks may have fewer digits than values.
             let is_mark = |mark: f64| value == mark || value as f32 == mark as f32;
-            let is_data = value.is_finite() && !header.no_data.is_some_and(is_mark);
+            let is_data = value.is_finite() && !no_data.is_some_and(is_mark);
             values.push(if is_data { value } else { f64::NAN });
         }
     }
@@ -175,7 +177,7 @@ mod tests {
         "NCOLS 3\nnrows 2\nxllcorner 100\nyllcorner 50\ncellsize 10\nNODATA_value -1\n";
 
     fn text(text: &str) -> Result<Raster, String> {
-        read(text.as_bytes(), |_| Ok(()))
+        read(text.as_bytes(), false, |_| Ok(()))
     }
 
     #[test]
@@ -197,7 +199,7 @@ mod tests {
         assert_eq!(marked.grid, raster.grid);
         let values: Vec<f32> = raster.values.iter().map(|&x| x as f32).collect();
         let again = write(&raster.grid, &values).expect("square cells");
-        let again = read(&again, |_| Ok(())).expect("a raster");
+        let again = read(&again, false, |_| Ok(())).expect("a raster");
         assert_eq!(again.grid, raster.grid);
         assert_eq!(
             format!("{:?}", again.values),

@@ -1,6 +1,6 @@
 //! GeoTIFF: the crate `tiff` reads tags and writes files, tags of places are ours (OGC 19-008r4, GeoTIFF 1.1).
 
-use std::io::Cursor;
+use std::io::{Cursor, Read, Seek};
 
 use tiff::Directory;
 use tiff::decoder::ifd::Value;
@@ -25,6 +25,8 @@ pub struct Beside<'a> {
     pub world_file: WorldFile<'a>,
     /// A mask of the cells with data, as GDAL writes it.
     pub mask: &'a dyn Fn() -> Result<Option<Vec<u8>>, String>,
+    /// Whether numbers are wanted as they are stored, whatever the file says of their scale and of cells without data.
+    pub is_raw: bool,
 }
 
 /// Reads a file of one band.
@@ -35,27 +37,28 @@ pub fn read(
 ) -> Result<Raster, String> {
     let (mut decoder, directory, inner) = pages(bytes)?;
     let page = Page::new(bytes, &mut decoder, &directory, &check)?;
-    let [width, height] = page.size;
-    let crs = crs(&mut decoder);
-    let transform = match transform(&mut decoder, crs.as_ref())? {
-        Some(transform) => transform,
-        None => (beside.world_file)()?.ok_or(
-            "it says nowhere where it is; wanted tags of GeoTIFF, or a world file of the same name with the extension .tfw",
-        )?,
-    };
+    let grid = grid(&mut decoder, beside.world_file)?;
+    let crs = grid.crs.as_ref();
     let no_data = no_data(&mut decoder)?;
     let notes = string(&mut decoder, Tag::Unknown(GDAL_METADATA)).unwrap_or_default();
     let [mut scale, mut offset] = scale_and_offset(&notes)?;
     // Heights in the unit of the ground, if both are known.
-    let of_heights = crs.as_ref().and_then(Crs::height_metres);
+    let of_heights = crs.and_then(Crs::height_metres);
     let of_heights = of_heights.or_else(|| unit_of_heights(&notes));
-    let of_ground = crs.as_ref().and_then(Crs::metres);
+    let of_ground = crs.and_then(Crs::metres);
     let height_factor = of_heights
         .zip(of_ground)
         .map(|(height, ground)| height / ground);
     scale *= height_factor.unwrap_or(1.0);
     offset *= height_factor.unwrap_or(1.0);
     let mut values = page.values(no_data.unwrap_or(0.0))?;
+    if beside.is_raw {
+        return Ok(Raster {
+            grid,
+            values,
+            height_factor,
+        });
+    }
     for value in &mut values {
         // Marks of floats are written with fewer digits than the pixels have.
         let is_mark = |mark: f64| *value == mark || page.is_float() && *value as f32 == mark as f32;
@@ -82,14 +85,30 @@ pub fn read(
         }
     }
     Ok(Raster {
-        grid: Grid {
-            width,
-            height,
-            transform: check_transform(transform)?,
-            crs,
-        },
+        grid,
         values,
         height_factor,
+    })
+}
+
+/// Where the cells of a file are, by the tags of its first page.
+pub fn grid<R: Read + Seek>(
+    decoder: &mut Decoder<R>,
+    world_file: WorldFile<'_>,
+) -> Result<Grid, String> {
+    let (width, height) = decoder.dimensions().map_err(|error| error.to_string())?;
+    let crs = crs(decoder);
+    let transform = match transform(decoder, crs.as_ref())? {
+        Some(transform) => transform,
+        None => world_file()?.ok_or(
+            "it says nowhere where it is; wanted tags of GeoTIFF, or a world file of the same name with the extension .tfw",
+        )?,
+    };
+    Ok(Grid {
+        width: width as usize,
+        height: height as usize,
+        transform: check_transform(transform)?,
+        crs,
     })
 }
 
@@ -156,16 +175,16 @@ fn pages(bytes: &[u8]) -> Result<(Bytes<'_>, Directory, Option<Directory>), Stri
 /// Most pages that are searched for a mask.
 const MOST_PAGES: usize = 4096;
 
-fn string(decoder: &mut Bytes<'_>, tag: Tag) -> Option<String> {
+fn string<R: Read + Seek>(decoder: &mut Decoder<R>, tag: Tag) -> Option<String> {
     let text = decoder.get_tag_ascii_string(tag).ok()?;
     Some(text.trim_end_matches('\0').to_owned())
 }
 
-fn doubles(decoder: &mut Bytes<'_>, tag: Tag) -> Option<Vec<f64>> {
+fn doubles<R: Read + Seek>(decoder: &mut Decoder<R>, tag: Tag) -> Option<Vec<f64>> {
     decoder.get_tag_f64_vec(tag).ok()
 }
 
-fn crs(decoder: &mut Bytes<'_>) -> Option<Crs> {
+fn crs<R: Read + Seek>(decoder: &mut Decoder<R>) -> Option<Crs> {
     let directory = decoder.get_tag_u16_vec(Tag::GeoKeyDirectoryTag).ok()?;
     Some(Crs {
         directory,
@@ -176,7 +195,10 @@ fn crs(decoder: &mut Bytes<'_>) -> Option<Crs> {
 }
 
 /// Where the cells are; `None` if the file does not say.
-fn transform(decoder: &mut Bytes<'_>, crs: Option<&Crs>) -> Result<Option<[f64; 6]>, String> {
+fn transform<R: Read + Seek>(
+    decoder: &mut Decoder<R>,
+    crs: Option<&Crs>,
+) -> Result<Option<[f64; 6]>, String> {
     let matrix = doubles(decoder, Tag::ModelTransformationTag);
     let ties = doubles(decoder, Tag::ModelTiepointTag);
     let scale = doubles(decoder, Tag::ModelPixelScaleTag);
@@ -362,6 +384,7 @@ mod tests {
         let beside = Beside {
             world_file: &|| Ok(Some(grid.transform)),
             mask: &|| Ok(None),
+            is_raw: false,
         };
         let placed = read(plain.get_ref(), &beside, |_| Ok(()));
         assert_eq!(placed.expect("a raster").grid, grid);
@@ -374,6 +397,7 @@ mod tests {
         let beside = Beside {
             world_file: &|| Ok(None),
             mask: &|| Ok(None),
+            is_raw: false,
         };
         let check = |size| crate::grid::check_size(size, 1 << 16);
         let (mut state, mut refused) = (1_u64, 0);

@@ -65,6 +65,55 @@ impl Grid {
         (width > 0.0 && is_square && skew == 0.0 && tilt == 0.0).then_some(width)
     }
 
+    /// Whether columns run from east to west, and rows from south to north; neither of turned and sheared cells.
+    pub(crate) fn mirrored(&self) -> [bool; 2] {
+        let [_, a, b, _, d, e] = self.transform;
+        let is_level = b == 0.0 && d == 0.0;
+        [is_level && a < 0.0, is_level && e > 0.0]
+    }
+
+    /// The same cells in rows from north to south and columns from west to east, unless they are turned or sheared.
+    pub(crate) fn upright(mut self) -> Self {
+        let [columns, rows] = self.mirrored();
+        let [x, a, _, y, _, e] = self.transform;
+        if rows {
+            self.transform[3] = y + e * self.height as f64;
+            self.transform[5] = -e;
+        }
+        if columns {
+            self.transform[0] = x + a * self.width as f64;
+            self.transform[1] = -a;
+        }
+        self
+    }
+
+    /// Name of the coordinate system.
+    pub(crate) fn system(&self) -> String {
+        let crs = self.crs.as_ref();
+        crs.map_or("no coordinate system".into(), Crs::name)
+    }
+
+    /// Column and row of the first cell of another grid among the cells of this one; `None` unless cells fall on cells.
+    pub(crate) fn place_of(&self, other: &Self) -> Option<[i64; 2]> {
+        let [x, a, b, y, d, e] = self.transform;
+        let area = a * e - b * d;
+        let cell = |c: usize, r: usize| {
+            let [east, north] = other.corner(c as f64, r as f64);
+            let [east, north] = [east - x, north - y];
+            [(e * east - b * north) / area, (a * north - d * east) / area]
+        };
+        let first = cell(0, 0).map(f64::round);
+        let is_on = |[c, r]: [usize; 2]| {
+            let [column, row] = cell(c, r);
+            let off = [column - first[0] - c as f64, row - first[1] - r as f64];
+            off.iter().all(|off| off.abs() <= OFF_LATTICE)
+        };
+        let corners = [[0, 0], [other.width, 0], [0, other.height]];
+        let is_one = self.system() == other.system() && corners.into_iter().all(is_on);
+        // No memory reaches so far, and sums do not overflow.
+        is_one.then(|| first.map(|cells| cells.clamp(-1e15, 1e15) as i64))
+    }
+
     /// Whether coordinates could be degrees: no coordinate system is known, and cells are small numbers on the globe.
     pub fn may_be_degrees(&self) -> bool {
         let ends = [[0, 0], [self.width, self.height]].map(|[c, r]| self.centre(c, r));
@@ -73,6 +122,9 @@ impl Grid {
         self.crs.is_none() && cell < 0.1 && ends.into_iter().all(is_on_globe)
     }
 }
+
+/// Parts of a cell that cells of one lattice may lie beside each other.
+const OFF_LATTICE: f64 = 1e-6;
 
 /// Refuses transforms that are no places of cells.
 pub(crate) fn check_transform(transform: [f64; 6]) -> Result<[f64; 6], String> {

@@ -1,8 +1,9 @@
 //! Height rasters as triangle meshes, and rasters of results with the same georeference.
 //!
 //! A digital elevation model (DEM) has a height in every cell. [`read`] reads a GeoTIFF, an ESRI ASCII grid (`.asc`) or a
-//! `.npy` with a world file. [`Raster::mesh`] joins the centres of the cells to triangles. [`write`](fn@write) writes values of
-//! the same cells, where the input was.
+//! `.npy` with a world file, [`read_all`] many of them as one raster: a folder, or a virtual raster of GDAL (`.vrt`).
+//! [`Raster::mesh`] joins the centres of the cells to triangles. [`write`](fn@write) writes values of the same cells, where the
+//! input was.
 //!
 //! ```
 //! use antumbra_raster::{Grid, Raster};
@@ -16,6 +17,7 @@
 //! ```
 //!
 //! - `grid`: where the cells are;  `mesh`: cells as triangles
+//! - `mosaic`: several files as one raster;  `vrt`: those that a .vrt names
 //! - `geotiff`, `asc`, `npy`: one format each;  `pixels`: strips and tiles of a TIFF;   `crs`: coordinate systems as GeoTIFF describes them
 #![forbid(unsafe_code)]
 
@@ -24,20 +26,26 @@ mod crs;
 mod geotiff;
 mod grid;
 mod mesh;
+mod mosaic;
 mod npy;
 mod pixels;
+mod vrt;
 
+use std::cell::Cell;
 use std::fs::{self, File};
-use std::io::{self, Cursor, Read, Write};
+use std::io::{self, BufReader, Cursor, Read, Write};
 use std::path::{Path, PathBuf};
+
+use tiff::decoder::Decoder;
 
 pub use crs::{Crs, Site, unit_name};
 use geotiff::Beside;
 pub use grid::{Grid, RasterCells};
 pub use mesh::RasterMesh;
+pub use mosaic::{Mosaic, Tiles, is_raster, neighbours, read_all};
 
 /// Extensions of files that [`read`] reads.
-pub const EXTENSIONS: [&str; 4] = ["tif", "tiff", "asc", "npy"];
+pub const EXTENSIONS: [&str; 5] = ["tif", "tiff", "asc", "npy", "vrt"];
 
 /// Reason why a raster was not read or written.
 #[derive(Debug, thiserror::Error)]
@@ -109,6 +117,8 @@ impl Purpose {
 /// | `.asc` | numbers, `NODATA_value` | header |
 /// | `.npy` | two dimensions of numbers; NaN is no data | a world file (`.wld`) |
 ///
+/// A folder, or a `.vrt` of GDAL, is read as [`read_all`] does.
+///
 /// Rows come back from north to south and columns from west to east, unless the raster is turned or sheared.
 ///
 /// A `.prj` file beside an `.asc`, a `.npy` or a plain `.tif` is its coordinate system.
@@ -117,34 +127,76 @@ impl Purpose {
 /// [`Error::Io`], or [`Error::Broken`] with the reason. Rasters in degrees are refused, since their cells have no length, and so are
 /// those in systems such as Web Mercator, whose lengths at the middle of the raster are not those on the ground: see [`Site::stretch`].
 pub fn read(path: &Path, max_bytes: u64, purpose: Purpose) -> Result<Raster, Error> {
-    let broken = |reason: String| Error::Broken {
-        path: path.to_path_buf(),
-        reason,
+    read_all(&[path.to_path_buf()], max_bytes, purpose).map(|mosaic| mosaic.raster)
+}
+
+/// Where the cells of a file are, by its header, in rows from north to south and columns from west to east.
+fn grid(path: &Path) -> Result<Grid, Error> {
+    let file = open(path).map_err(|source| unread(path, source))?;
+    let tags = |file| Decoder::new(BufReader::new(file)).map_err(|error| error.to_string());
+    let found = match &*extension(path) {
+        "tif" | "tiff" => tags(file)
+            .and_then(|mut tags| geotiff::grid(&mut tags, &|| world_file(path, &["tfw", "wld"]))),
+        kind => start(kind, file, path),
     };
+    let mut grid = found.map_err(|reason| broken(path, reason))?;
+    if grid.crs.is_none() {
+        grid.crs = system_beside(path);
+    }
+    Ok(grid.upright())
+}
+
+/// Where the cells of a file are that has its header at its start, without reading on.
+fn start(kind: &str, file: File, path: &Path) -> Result<Grid, String> {
+    let mut bytes = Vec::new();
+    let read = file.take(SMALL).read_to_end(&mut bytes);
+    read.map_err(|error| error.to_string())?;
+    let seen = Cell::new(None);
+    let stop = |grid: &Grid| {
+        seen.set(Some(grid.clone()));
+        Err(String::new())
+    };
+    let read = match kind {
+        "asc" => asc::read(&bytes, false, stop),
+        _ => npy::read(&bytes, &|| world_file(path, &["wld"]), stop),
+    };
+    seen.take()
+        .map_or_else(|| read.map(|raster| raster.grid), Ok)
+}
+
+/// Reads one file as it is stored: rows and columns in its own order, and numbers without a meaning if it is to be `is_raw`.
+fn stored(path: &Path, max_bytes: u64, purpose: Purpose, is_raw: bool) -> Result<Raster, Error> {
     let bytes = read_file(path, max_bytes)?;
     let room = purpose.room(max_bytes - bytes.len() as u64);
-    let check = |[width, height]: [usize; 2]| grid::check_size([width, height], room);
+    let check = |size: [usize; 2]| grid::check_size(size, room);
+    let check_grid = |grid: &Grid| check([grid.width, grid.height]);
     let mut raster = match extension(path).as_str() {
         "tif" | "tiff" => {
             let beside = Beside {
                 world_file: &|| world_file(path, &["tfw", "wld"]),
                 mask: &|| mask(path, max_bytes),
+                is_raw,
             };
             geotiff::read(&bytes, &beside, check)
         }
-        "asc" => asc::read(&bytes, check),
-        "npy" => npy::read(&bytes, &|| world_file(path, &["wld"]), check),
+        "asc" => asc::read(&bytes, is_raw, check_grid),
+        "npy" => npy::read(&bytes, &|| world_file(path, &["wld"]), check_grid),
+        "vrt" => Err(vrt::not_read("another .vrt")),
         other => Err(format!("`{other}` is no extension of a raster")),
     }
-    .map_err(broken)?;
-    raster = raster.north_up();
+    .map_err(|reason| broken(path, reason))?;
     if raster.grid.crs.is_none() {
         raster.grid.crs = system_beside(path);
     }
-    let grid = &raster.grid;
+    Ok(raster)
+}
+
+/// Refuses coordinates in which lengths are not those on the ground.
+fn check_lengths(path: &Path, grid: &Grid) -> Result<(), Error> {
+    let broken = |reason: String| broken(path, reason);
     let middle = grid.corner(0.5 * grid.width as f64, 0.5 * grid.height as f64);
     let Some(crs) = &grid.crs else {
-        return Ok(raster);
+        return Ok(());
     };
     if crs.is_geographic() {
         let utm = crs::utm(middle[1], middle[0]);
@@ -163,7 +215,15 @@ pub fn read(path: &Path, max_bytes: u64, purpose: Purpose) -> Result<Raster, Err
             site.utm()
         )));
     }
-    Ok(raster)
+    Ok(())
+}
+
+/// A file whose contents are wrong.
+fn broken(path: &Path, reason: String) -> Error {
+    Error::Broken {
+        path: path.to_path_buf(),
+        reason,
+    }
 }
 
 /// Files beside a raster that [`read`] looks at, if they exist.
@@ -253,27 +313,15 @@ impl Raster {
     /// The same raster with its rows from north to south and its columns from west to east, if it has any: squares are cut along
     /// the same diagonal however a file stores them. Turned and sheared rasters stay as they are.
     fn north_up(mut self) -> Self {
-        let Grid {
-            width,
-            height,
-            transform: [x, a, b, y, d, e],
-            ..
-        } = self.grid;
-        if b != 0.0 || d != 0.0 {
-            return self;
-        }
-        if e > 0.0 {
-            self.grid.transform[3] = y + e * height as f64;
-            self.grid.transform[5] = -e;
+        let [columns, rows] = self.grid.mirrored();
+        self.grid = self.grid.upright();
+        if rows {
             // All rows, and then the columns of each row back again.
             self.values.reverse();
         }
-        if a < 0.0 {
-            self.grid.transform[0] = x + a * width as f64;
-            self.grid.transform[1] = -a;
-        }
-        if (e > 0.0) != (a < 0.0) {
-            self.values.chunks_mut(width).for_each(<[f64]>::reverse);
+        if rows != columns {
+            let lines = self.values.chunks_mut(self.grid.width);
+            lines.for_each(<[f64]>::reverse);
         }
         self
     }
@@ -283,7 +331,7 @@ impl Raster {
     /// # Errors
     /// What is wrong, with its line.
     pub fn from_asc(text: &str) -> Result<Self, String> {
-        asc::read(text.as_bytes(), |_| Ok(()))
+        asc::read(text.as_bytes(), false, |_| Ok(()))
     }
 
     /// Reads the bytes of a GeoTIFF.
@@ -294,6 +342,7 @@ impl Raster {
         let nothing = Beside {
             world_file: &|| Ok(None),
             mask: &|| Ok(None),
+            is_raw: false,
         };
         geotiff::read(bytes, &nothing, |_| Ok(())).map(Raster::north_up)
     }
@@ -305,19 +354,31 @@ fn extension(path: &Path) -> String {
     extension.to_string_lossy().to_ascii_lowercase()
 }
 
-/// Reads a regular file of at most so many bytes.
-fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
-    let io = |source| Error::Io {
+/// Opens a regular file.
+fn open(path: &Path) -> io::Result<File> {
+    // Checked before opening, because opening a pipe waits for its writer.
+    match fs::metadata(path)?.is_file() {
+        true => File::open(path),
+        false => Err(io::Error::new(
+            io::ErrorKind::InvalidInput,
+            "not a regular file",
+        )),
+    }
+}
+
+fn unread(path: &Path, source: io::Error) -> Error {
+    Error::Io {
         path: path.to_path_buf(),
         source,
-    };
-    let refused = |message: String| io(io::Error::new(io::ErrorKind::InvalidInput, message));
-    // Checked before opening, because opening a pipe waits for its writer.
-    let about = fs::metadata(path).map_err(io)?;
-    if !about.is_file() {
-        return Err(refused("not a regular file".into()));
     }
-    let length = about.len();
+}
+
+/// Reads a regular file of at most so many bytes.
+fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
+    let io = |source| unread(path, source);
+    let refused = |message: String| io(io::Error::new(io::ErrorKind::InvalidInput, message));
+    let file = open(path).map_err(io)?;
+    let length = file.metadata().map_err(io)?.len();
     if length > limit {
         return Err(refused(format!(
             "the file has {length} bytes, but only {limit} bytes of memory are allowed"
@@ -326,7 +387,6 @@ fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
     let room = bytes.try_reserve_exact(length as usize);
     room.map_err(|error| refused(error.to_string()))?;
-    let file = File::open(path).map_err(io)?;
     file.take(length).read_to_end(&mut bytes).map_err(io)?;
     Ok(bytes)
 }

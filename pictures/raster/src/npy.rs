@@ -12,7 +12,7 @@ pub type WorldFile<'a> = &'a dyn Fn() -> Result<Option<[f64; 6]>, String>;
 pub fn read(
     bytes: &[u8],
     world_file: WorldFile<'_>,
-    check: impl Fn([usize; 2]) -> Result<(), String>,
+    check: impl Fn(&Grid) -> Result<(), String>,
 ) -> Result<Raster, String> {
     let not_npy = || "it is no .npy file".to_owned();
     let rest = bytes.strip_prefix(MAGIC).ok_or_else(not_npy)?;
@@ -33,7 +33,17 @@ pub fn read(
     let (head, data) = rest.split_at_checked(length).ok_or_else(not_npy)?;
     let head = String::from_utf8_lossy(head);
     let [height, width] = shape(&head)?;
-    check([width, height])?;
+    let transform = world_file()?.ok_or(
+        "an .npy has no place; add a world file of the same name with the extension .wld, of six lines: cell width, 0, 0, \
+         minus cell height, x and y of the centre of the first cell",
+    )?;
+    let grid = Grid {
+        width,
+        height,
+        transform: check_transform(transform)?,
+        crs: None,
+    };
+    check(&grid)?;
     let is_fortran = field(&head, "fortran_order").is_some_and(|text| text.starts_with("True"));
     let kind = field(&head, "descr").unwrap_or_default();
     let kind = kind.trim_start_matches(['\'', '"']);
@@ -47,17 +57,8 @@ pub fn read(
     let values = values
         .map(|value| if value.is_finite() { value } else { f64::NAN })
         .collect();
-    let transform = world_file()?.ok_or(
-        "an .npy has no place; add a world file of the same name with the extension .wld, of six lines: cell width, 0, 0, \
-         minus cell height, x and y of the centre of the first cell",
-    )?;
     Ok(Raster {
-        grid: Grid {
-            width,
-            height,
-            transform: check_transform(transform)?,
-            crs: None,
-        },
+        grid,
         values,
         height_factor: None,
     })
