@@ -10,10 +10,10 @@ use antumbra::{BuildMonitor, Isa, Ray};
 use antumbra_image::{Allowance, Raster, Samples};
 use antumbra_lab::count;
 use antumbra_load::{
-    Diagnostic, Extent, Heights, Loaded, MemorySize, Options, Severity, Sky, Stage, Up, Upright,
-    check_picture,
+    Diagnostic, Extent, Heights, Loaded, MemorySize, Options, Severity, Sky, Stage, Tiles, Up,
+    Upright, check_picture,
 };
-use antumbra_raster::{Crs, unit_name};
+use antumbra_raster::{Crs, Grid, unit_name};
 use antumbra_render::{Camera, World};
 use antumbra_scene::{Image, Pixels, Projection, Sampler, Scene};
 use antumbra_trees::ORDERS;
@@ -54,20 +54,26 @@ fn options(max_memory: MemorySize, looks: bool) -> Options {
 
 /// Reads or generates a scene for a job that uses no materials, and prints the reader's warnings and notes.
 pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
-    read(name, max_memory, false)
+    load_one(&[name.to_path_buf()], max_memory)
+}
+
+/// As [`load`], perhaps of several height rasters that are one scene.
+pub fn load_one(names: &[PathBuf], max_memory: MemorySize) -> Result<Loaded, Failure> {
+    read(names, max_memory, false)
 }
 
 /// Reads or generates a scene with its materials, and prints the reader's warnings and notes.
 pub fn load_with_looks(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
-    read(name, max_memory, true)
+    read(&[name.to_path_buf()], max_memory, true)
 }
 
-fn read(name: &Path, max_memory: MemorySize, looks: bool) -> Result<Loaded, Failure> {
+fn read(names: &[PathBuf], max_memory: MemorySize, looks: bool) -> Result<Loaded, Failure> {
+    let name = &names[0];
     let reading = progress::doing(&name.to_string_lossy(), "reading");
     let options = options(max_memory, looks);
     let loaded = match name == Path::new(STDIN) {
         true => antumbra_load::load_text(standard_input(max_memory)?, &options),
-        false => antumbra_load::load(name, &options),
+        false => antumbra_load::load_all(names, &options),
     };
     drop(reading);
     interrupt::check()?;
@@ -99,19 +105,43 @@ fn read(name: &Path, max_memory: MemorySize, looks: bool) -> Result<Loaded, Fail
     for feature in &loaded.left_out {
         tell(format_args!("note: {}: {feature}", name.display()));
     }
+    let grid = loaded.raster.as_ref().map(|raster| &raster.grid);
+    tell_tiles(name, loaded.tiles.zip(grid));
     Ok(loaded)
 }
 
-/// Reads a height raster without making a mesh of it, and prints the reader's warnings.
-pub fn load_heights(name: &Path, max_memory: MemorySize) -> Result<Heights, Failure> {
-    let reading = progress::doing(&name.to_string_lossy(), "reading");
-    let heights = antumbra_load::load_heights(name, &options(max_memory, false));
+/// Says what several files are that are one raster.
+fn tell_tiles(name: &Path, found: Option<(Tiles, &Grid)>) {
+    let Some((tiles, grid)) = found else {
+        return;
+    };
+    let (name, width, height) = (name.display(), grid.width, grid.height);
+    let mut text = format!(
+        "{name}: {} files are one raster of {width} x {height} cells",
+        tiles.files
+    );
+    if tiles.differing > 0 {
+        let which = if tiles.is_last_above { "last" } else { "first" };
+        let cells = count(tiles.differing);
+        text += &format!("; in {cells} of them files differ, and the {which} one has them");
+    }
+    if tiles.empty > 0 {
+        text += &format!("; in {} of them no file has data", count(tiles.empty));
+    }
+    tell(format_args!("{text}"));
+}
+
+/// Reads height rasters as one without making a mesh of it, and prints the reader's warnings.
+pub fn load_heights(names: &[PathBuf], max_memory: MemorySize) -> Result<Heights, Failure> {
+    let reading = progress::doing(&names[0].to_string_lossy(), "reading");
+    let heights = antumbra_load::load_heights(names, &options(max_memory, false));
     drop(reading);
     interrupt::check()?;
     let heights = heights?;
     for warning in &heights.warnings {
         tell(format_args!("{warning}"));
     }
+    tell_tiles(&names[0], heights.tiles.zip(Some(&heights.raster.grid)));
     Ok(heights)
 }
 

@@ -9,8 +9,7 @@ use antumbra_scene::builtin;
 use crate::{Crop, MemorySize};
 
 /// The formats a scene may have.
-const KNOWN: &str =
-    ".pbrt, .ply, .obj, .stl, .gltf, .glb, height rasters as .tif, .asc or .npy, or builtin:NAME";
+const KNOWN: &str = ".pbrt, .ply, .obj, .stl, .gltf, .glb, height rasters as .tif, .asc, .npy or .vrt, a folder of rasters, or builtin:NAME";
 
 /// Why a scene was not loaded or cannot be used as requested.
 #[derive(Debug, thiserror::Error)]
@@ -34,12 +33,6 @@ pub enum Error {
     #[error("{}: only .pbrt and .ply files may be compressed; decompress it first", path.display())]
     Compressed {
         /// The file.
-        path: PathBuf,
-    },
-    /// A folder where a file is needed.
-    #[error("{}: it is a folder, not a scene file", path.display())]
-    Folder {
-        /// The folder.
         path: PathBuf,
     },
     /// A mesh file without triangles.

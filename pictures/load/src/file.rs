@@ -7,7 +7,7 @@ use std::time::Instant;
 use antumbra::recipe::Order;
 use antumbra_mesh::{Names, Warning, load_gltf, load_obj, load_stl, plain_material};
 use antumbra_pbrt::{Diagnostic, Times};
-use antumbra_raster::RasterCells;
+use antumbra_raster::{RasterCells, Tiles, is_raster};
 use antumbra_scene::material::Matte;
 use antumbra_scene::{Geometry, Material, Param, Scene, Shape, Texture, TriangleMesh, builtin};
 
@@ -81,6 +81,8 @@ pub struct Loaded {
     pub names: Names,
     /// Cells of a height raster, which are the vertices of its mesh; `None` for other files.
     pub raster: Option<Arc<RasterCells>>,
+    /// What there is to say about several files that are one raster.
+    pub tiles: Option<Tiles>,
     /// Every file that was read: scenes, meshes, images, spectra and buffers.
     pub inputs: Vec<PathBuf>,
 }
@@ -101,26 +103,37 @@ impl Loaded {
             files: Vec::new(),
             names: Names::default(),
             raster: None,
+            tiles: None,
             inputs: Vec::new(),
         }
     }
 }
 
-/// Reads or generates a scene: a file, by its extension, or `builtin:NAME[:TRIANGLES]`.
+/// Reads or generates a scene: a file, by its extension, a folder of height rasters, or `builtin:NAME[:TRIANGLES]`.
 ///
 /// # Errors
 /// The name is unknown, the file has mistakes, or the scene takes more memory than allowed. With [`Options::strict`],
 /// warnings are errors, too.
 pub fn load(name: &Path, options: &Options) -> Result<Loaded, Error> {
+    load_all(&[name.to_path_buf()], options)
+}
+
+/// Reads several height rasters as one scene; one name as [`load`] does.
+///
+/// # Errors
+/// As [`load`]. Several files that are no rasters, or not one raster.
+pub fn load_all(names: &[PathBuf], options: &Options) -> Result<Loaded, Error> {
     let start = Instant::now();
+    let name = names.first().map_or(Path::new(""), PathBuf::as_path);
     let mut loaded = match name.to_str().and_then(|name| name.strip_prefix(BUILTIN)) {
+        _ if names.len() > 1 => from_origin(|origin| mesh((name, names), options, origin))?,
         Some(name) => Loaded::plain(built_in(name)?),
         None if extension(name) == "pbrt" => from_origin(|origin| {
             let mut loaded = antumbra_pbrt::load(name, &pbrt_options(options, origin))?;
             loaded.scene.name = stem(name);
             Ok(of_pbrt(loaded))
         })?,
-        None => from_origin(|origin| mesh(name, options, origin))?,
+        None => from_origin(|origin| mesh((name, names), options, origin))?,
     };
     if options.strict && !loaded.warnings.is_empty() {
         return Err(Error::Strict(loaded.warnings));
@@ -193,11 +206,17 @@ fn extension(path: &Path) -> String {
     extension.to_string_lossy().to_ascii_lowercase()
 }
 
-fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> {
+/// Reads a mesh, or all rasters that are one scene, of which `path` is the first.
+fn mesh(
+    (path, all): (&Path, &[PathBuf]),
+    options: &Options,
+    origin: DVec3,
+) -> Result<Loaded, Error> {
     let limit = options.max_memory.bytes();
     let extension = extension(path);
     let owned = || path.to_path_buf();
     let mut loaded = match extension.as_str() {
+        _ if is_raster(path) || all.len() > 1 => terrain::load(all, limit, origin)?,
         // The readers of other formats take files as they are.
         "stl" | "obj" | "gltf" | "glb" | "tif" | "tiff" | "asc" | "npy"
             if decompressed(path) != path =>
@@ -216,10 +235,6 @@ fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> 
         "stl" => plain_mesh(path, load_stl(path, limit, origin)?),
         "obj" => of_model(path, load_obj(path, limit, origin, options.looks)?),
         "gltf" | "glb" => of_model(path, load_gltf(path, limit, origin, options.looks)?),
-        "tif" | "tiff" | "asc" | "npy" => terrain::load(path, stem(path), limit, origin)?,
-        _ if path.is_dir() => {
-            return Err(Error::Folder { path: owned() });
-        }
         _ => {
             return Err(Error::UnknownFormat {
                 path: owned(),
@@ -246,7 +261,9 @@ fn mesh(path: &Path, options: &Options, origin: DVec3) -> Result<Loaded, Error> 
             text: "every material is wholly transparent, so nothing can be seen".to_owned(),
         });
     }
-    loaded.inputs.push(path.to_path_buf());
+    if loaded.raster.is_none() {
+        loaded.inputs.push(path.to_path_buf());
+    }
     loaded.scene.origin = origin;
     Ok(loaded)
 }
@@ -338,6 +355,21 @@ fn stem(path: &Path) -> String {
     let path = decompressed(path);
     let stem = path.file_stem().unwrap_or_default();
     stem.to_string_lossy().into_owned()
+}
+
+/// Name of the scene of some rasters: the first file's, and how many there are more.
+pub fn raster_name(paths: &[PathBuf]) -> String {
+    let first = paths.first().map_or(Path::new(""), PathBuf::as_path);
+    // A folder such as `.` has its name elsewhere.
+    let named = first
+        .canonicalize()
+        .ok()
+        .filter(|_| first.file_stem().is_none());
+    let name = stem(named.as_deref().unwrap_or(first));
+    match paths.len() {
+        0 | 1 => name,
+        number => format!("{name} and {} more", number - 1),
+    }
 }
 
 /// A scene's name as part of a file's name: without `builtin:`, and with `-` for every character that may mean

@@ -1,7 +1,7 @@
 //! Scenes from whatever the user calls a scene.
 //!
 //! [`load`] takes a path (`.pbrt`, `.ply`, `.obj`, `.stl`, `.gltf`, `.glb`), a height
-//! raster (`.tif`, `.asc`, `.npy`) or `builtin:NAME[:TRIANGLES]` and returns a
+//! raster (`.tif`, `.asc`, `.npy`, `.vrt`, or a folder of them) or `builtin:NAME[:TRIANGLES]` and returns a
 //! [`Scene`](antumbra_scene::Scene):
 //!
 //! ```
@@ -44,12 +44,12 @@ pub use adjust::{
 };
 pub use antumbra_mesh::{Names, Part, Warning};
 pub use antumbra_pbrt::{Diagnostic, Severity};
-pub use antumbra_raster::RasterCells;
+pub use antumbra_raster::{RasterCells, Tiles};
 pub use crop::Crop;
 pub use error::Error;
 pub use estimate::check_picture;
 pub use extent::Extent;
-pub use file::{Loaded, Options, file_stem, load, load_text};
+pub use file::{Loaded, Options, file_stem, load, load_all, load_text, raster_name};
 pub use memory::{BadSize, MemorySize};
 pub use stage::{
     OwnStage, Sky, Stage, Sun, Up, scene_of_mesh, scene_of_model, set_ground, set_stage,

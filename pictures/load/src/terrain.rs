@@ -4,18 +4,22 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use antumbra_mesh::{Warning, plain_material};
-use antumbra_raster::{Crs, Purpose, Raster, companions, read, unit_name};
+use antumbra_raster::{Crs, Mosaic, Purpose, Raster, Tiles, read_all, unit_name};
 use antumbra_scene::TriangleMesh;
 use glam::DVec3;
 
-use crate::file::Loaded;
+use crate::file::{Loaded, raster_name};
 use crate::stage::{OwnStage, scene_of_mesh};
 use crate::{Error, Extent, Options};
 
-/// Reads a raster as the surface between the centres of its cells, measured from `origin`, within `limit` bytes.
-pub fn load(path: &Path, name: String, limit: u64, origin: DVec3) -> Result<Loaded, Error> {
-    let raster = read(path, limit, Purpose::Mesh)?;
-    let warnings = warnings(path, &raster);
+/// Reads rasters as the surface between the centres of their cells, measured from `origin`, within `limit` bytes.
+pub fn load(paths: &[PathBuf], limit: u64, origin: DVec3) -> Result<Loaded, Error> {
+    let Mosaic {
+        raster,
+        inputs,
+        tiles,
+    } = read_all(paths, limit, Purpose::Mesh)?;
+    let warnings = warnings(&paths[0], &raster);
     let surface = raster.mesh(origin.to_array());
     let cells = raster.into_cells(&surface);
     let mesh = TriangleMesh {
@@ -29,8 +33,9 @@ pub fn load(path: &Path, name: String, limit: u64, origin: DVec3) -> Result<Load
         stage: Some(OwnStage::default()),
         warnings,
         raster: Some(Arc::new(cells)),
-        inputs: companions(path),
-        ..Loaded::plain(scene_of_mesh(name, mesh, plain_material()))
+        tiles,
+        inputs,
+        ..Loaded::plain(scene_of_mesh(raster_name(paths), mesh, plain_material()))
     })
 }
 
@@ -43,17 +48,25 @@ pub struct Heights {
     pub extent: Option<Extent>,
     /// Doubts that the raster is in one unit of length.
     pub warnings: Vec<Warning>,
-    /// Other files that were read.
+    /// What there is to say about several files that are one raster.
+    pub tiles: Option<Tiles>,
+    /// Every file that was read.
     pub inputs: Vec<PathBuf>,
 }
 
-/// Reads a height raster (`.tif`, `.asc` or `.npy`) for work that needs no mesh.
+/// Reads a height raster for work that needs no mesh: a `.tif`, `.asc`, `.npy` or `.vrt`, or files and folders that are one
+/// raster, as [`read_all`] reads them.
 ///
 /// # Errors
-/// The file has mistakes, or takes more memory than allowed. With [`Options::strict`], warnings are errors, too.
-pub fn load_heights(path: &Path, options: &Options) -> Result<Heights, Error> {
-    let raster = read(path, options.max_memory.bytes(), Purpose::Values)?;
-    let warnings = warnings(path, &raster);
+/// A file has mistakes, or all take more memory than allowed. With [`Options::strict`], warnings are errors, too.
+pub fn load_heights(paths: &[PathBuf], options: &Options) -> Result<Heights, Error> {
+    let Mosaic {
+        raster,
+        inputs,
+        tiles,
+    } = read_all(paths, options.max_memory.bytes(), Purpose::Values)?;
+    let warnings = paths.first().map(|path| warnings(path, &raster));
+    let warnings = warnings.unwrap_or_default();
     if options.strict && !warnings.is_empty() {
         return Err(Error::Strict(warnings));
     }
@@ -68,7 +81,8 @@ pub fn load_heights(path: &Path, options: &Options) -> Result<Heights, Error> {
         raster,
         extent,
         warnings,
-        inputs: companions(path),
+        tiles,
+        inputs,
     })
 }
 
@@ -127,7 +141,7 @@ mod tests {
         let cells = loaded.raster.expect("cells");
         assert_eq!(cells.cells, [0, 1, 2, 3, 4, 5]);
         let extent = Extent::of(&loaded.scene).expect("an extent");
-        let plain = load_heights(&path, &Options::default()).expect("heights");
+        let plain = load_heights(&[path], &Options::default()).expect("heights");
         assert_eq!(plain.extent.expect("an extent").size(), extent.size());
         assert!(loaded.warnings.is_empty() && plain.raster.values[5] == 6.0);
     }
@@ -154,7 +168,7 @@ mod tests {
     fn units_of_heights_are_those_of_the_ground() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../raster/tests/rasters");
         let open =
-            |name: &str| load_heights(format!("{folder}/{name}").as_ref(), &Options::default());
+            |name: &str| load_heights(&[format!("{folder}/{name}").into()], &Options::default());
         let both = open("feet.tif").expect("feet");
         assert!(both.warnings.is_empty(), "{:?}", both.warnings);
         let mixed = open("feet_metres.tif").expect("feet and metres");

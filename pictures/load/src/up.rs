@@ -41,7 +41,7 @@ impl Upright {
         if matches!(extension.as_str(), "gltf" | "glb") {
             return found(Up::Y, "as glTF has it");
         }
-        if matches!(extension.as_str(), "tif" | "tiff" | "asc" | "npy") {
+        if antumbra_raster::is_raster(name) {
             return found(Up::Z, "as rasters of heights have it");
         }
         if has_camera {

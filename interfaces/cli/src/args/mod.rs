@@ -80,8 +80,15 @@ pub mod heading {
 pub const SCENE: &str = "Scene file, - or builtin:NAME[:TRIANGLES]";
 pub const SCENE_LONG: &str = "\
 Scene: a .pbrt file, a mesh (.ply, .obj, .stl, .gltf or .glb, with its materials, shown under a clear sky unless it \
-has lights), a height raster (.tif, .asc or .npy), or a built-in scene as builtin:NAME[:TRIANGLES], such as builtin:city or builtin:city:20000. - reads a \
+has lights), a height raster (.tif, .asc, .npy, .vrt, or a folder of tiles), or a built-in scene as builtin:NAME[:TRIANGLES], such as builtin:city or builtin:city:20000. - reads a \
 .pbrt file from the standard input";
+
+/// The same of commands that take several rasters.
+pub fn rasters_long() -> String {
+    format!(
+        "{SCENE_LONG}. Height rasters whose cells fall on each other are one scene, such as tiles/*.tif"
+    )
+}
 
 /// Ray tracing that learns from shadow rays
 ///

@@ -18,7 +18,7 @@ use super::files::{self, Format};
 use super::ground::Ground;
 use super::raster;
 use super::view::View;
-use crate::args::{ChunkArgs, PoseArgs, Resolution, SCENE, SCENE_LONG, heading, values};
+use crate::args::{ChunkArgs, PoseArgs, Resolution, SCENE, heading, rasters_long, values};
 use crate::exit::{Failure, tell};
 use crate::json::Destination;
 use crate::output::{self, Files, text};
@@ -70,8 +70,8 @@ fn format(args: &AoArgs) -> Result<Format, Failure> {
 /// Flags of `ao`.
 #[derive(Debug, Args)]
 pub struct AoArgs {
-    #[arg(help = SCENE, long_help = SCENE_LONG)]
-    pub scene: PathBuf,
+    #[arg(required = true, help = SCENE, long_help = rasters_long())]
+    pub scene: Vec<PathBuf>,
     /// Mesh, picture or texture; - is the standard output
     ///
     /// A .ply, .glb or .npz holds a mesh, a .png or .exr a picture or texture. A .ply or .glb has the triangles of all meshes in world space, with normals.

@@ -13,6 +13,7 @@ use serde::{Serialize, Serializer};
 use super::chunks::{self, PartFile};
 use super::ground::Ground;
 use super::map;
+use super::raster::is_raster;
 use super::terrain::Terrain;
 use super::visible::VisibleArgs;
 use crate::args::ChunkArgs;
@@ -48,8 +49,8 @@ pub trait Baking: Shared {
 
 /// Arguments of all bakes. [`bakes`] implements it.
 pub trait Shared {
-    /// Scene, outputs, document, and flags about chunks.
-    fn shared(&self) -> (&Path, &[PathBuf], Option<&Destination>, &ChunkArgs);
+    /// Files of the scene, outputs, document, and flags about chunks.
+    fn shared(&self) -> (&[PathBuf], &[PathBuf], Option<&Destination>, &ChunkArgs);
 
     /// Wants the whole as these outputs and this document.
     fn want(&mut self, outputs: &[PathBuf], json: Option<&Destination>);
@@ -80,7 +81,7 @@ macro_rules! bakes {
         }
 
         $(impl command::Shared for $args {
-            fn shared(&self) -> (&Path, &[PathBuf], Option<&Destination>, &ChunkArgs) {
+            fn shared(&self) -> (&[PathBuf], &[PathBuf], Option<&Destination>, &ChunkArgs) {
                 (&self.scene, &self.output, self.json.as_ref(), &self.chunks)
             }
 
@@ -101,6 +102,11 @@ pub fn run(
 ) -> Result<(), Failure> {
     let (scene, outputs, json, chunks) = args.shared();
     let isa = chunks.machine.isa()?;
+    let is_other = |path: &&PathBuf| scene.len() > 1 && !is_raster(std::slice::from_ref(path));
+    if let Some(other) = scene.iter().find(is_other) {
+        let reason = "it is no height raster, and only rasters are one scene together";
+        return Err(Failure::name(other, reason));
+    }
     if chunks.shard.is_none() || args.is_picture() {
         args.check()?;
     }
@@ -127,7 +133,7 @@ pub fn run(
 
 /// Arguments that all bakes have.
 pub struct Bake<'a> {
-    scene: &'a Path,
+    scene: &'a [PathBuf],
     pub outputs: &'a [PathBuf],
     json: Option<&'a Destination>,
     chunks: &'a ChunkArgs,
@@ -202,7 +208,7 @@ impl Bake<'_> {
     /// Notes all files, with the files of these flags, and checks that outputs can be written.
     fn declare(&self, [written, read]: [Vec<Named<'_>>; 2]) -> Result<Files, Failure> {
         let is_shared = self.chunks.shard.is_some() || self.parts.is_some();
-        if is_shared && self.scene == Path::new(scenes::STDIN) {
+        if is_shared && self.scene == [Path::new(scenes::STDIN)] {
             let reason = "merge reads the mesh again: shards need a file, not the standard input";
             return Err(Failure::Usage(reason.into()));
         }
@@ -212,8 +218,8 @@ impl Bake<'_> {
         files.writes_some(written.into_iter().chain([json]))?;
         let parts = self.parts.unwrap_or_default().iter();
         let parts = parts.map(|file| ("the part", Some(&*file.path)));
-        let scene = ("the scene", Some(self.scene));
-        files.reads_some(parts.chain([scene]).chain(read))?;
+        let scene = self.scene.iter().map(|path| ("the scene", Some(&**path)));
+        files.reads_some(parts.chain(scene).chain(read))?;
         files.check()?;
         Ok(files)
     }

@@ -8,7 +8,7 @@ use antumbra_bake::{Array, Entry, Groups, Orientation, UpAxis, ViewFactorJob};
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_scene::Geometry;
-use clap::Args;
+use clap::{ArgAction, Args};
 
 use super::command::{Bake, Baking, Figure};
 use super::files::{self, Format, field};
@@ -26,8 +26,8 @@ const MOST: usize = 20_000;
 /// Flags of `factors`.
 #[derive(Debug, Args)]
 pub struct FactorArgs {
-    #[arg(help = SCENE, long_help = SCENE_LONG)]
-    pub scene: PathBuf,
+    #[arg(required = true, num_args = 1, action = ArgAction::Set, help = SCENE, long_help = SCENE_LONG)]
+    pub scene: Vec<PathBuf>,
     /// Result: .csv or .npz
     ///
     /// May be given several times. A .csv has a line for each surface: its names, its area in squared units, its factor to every

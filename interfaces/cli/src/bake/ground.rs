@@ -1,6 +1,6 @@
 //! Scenes that are baked, and points of them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -17,6 +17,7 @@ use antumbra_render::World;
 use antumbra_scene::{Geometry, Scene, Shape, TriangleMesh};
 
 use super::parts::Parts;
+use super::raster::tell_neighbours;
 use super::visible::VisibleArgs;
 use crate::exit::{Failure, say, tell};
 use crate::output::Files;
@@ -43,14 +44,17 @@ pub struct Ground {
 impl Ground {
     /// Reads a scene and builds its tree. Flags of `visible` with `--curvature` bend it.
     pub fn load(
-        name: &Path,
+        names: &[PathBuf],
         isa: Isa,
         memory: MemorySize,
         files: &mut Files,
         bent: Option<&VisibleArgs>,
     ) -> Result<Self, Failure> {
-        let mut loaded = scenes::load(name, memory)?;
+        let mut loaded = scenes::load_one(names, memory)?;
         files.reads_all(&loaded.inputs)?;
+        if let Some(raster) = &loaded.raster {
+            tell_neighbours(names, &raster.grid);
+        }
         let flat = loaded.scene.flattened();
         let flat = flat.map_err(|error| Failure::scene(&loaded.scene.name, error))?;
         loaded.scene = flat.into_owned();

@@ -19,7 +19,7 @@ use super::places::{self, Places};
 use super::raster;
 use super::site::Asked;
 use super::terrain::is_terrain;
-use crate::args::{ChunkArgs, PlaceArgs, RasterArgs, SCENE, SCENE_LONG, heading, values};
+use crate::args::{ChunkArgs, PlaceArgs, RasterArgs, SCENE, heading, rasters_long, values};
 use crate::exit::{Failure, tell};
 use crate::interrupt;
 use crate::json::Destination;
@@ -36,8 +36,8 @@ const QUANTITY: Quantity<'static> = Quantity {
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("where").required(true))]
 pub struct HorizonArgs {
-    #[arg(help = SCENE, long_help = SCENE_LONG)]
-    pub scene: PathBuf,
+    #[arg(required = true, help = SCENE, long_help = rasters_long())]
+    pub scene: Vec<PathBuf>,
     /// Result: .csv, .npz or .tif
     ///
     /// May be given several times. A .csv has a line per sensor and a column per azimuth, such as horizon_090. An .npz has the

@@ -29,7 +29,7 @@ mod terrain;
 mod view;
 mod visible;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::args::ChunkArgs;
 use crate::json::Destination;
@@ -51,7 +51,7 @@ command::bakes! {
     /// antumbra sun city.ply --grid 2 --lat 48.2 --lon 16.4 --timezone 1 -o hours.csv -o hours.png
     ///
     /// Suns are where the algorithm of NREL has them. Light that surfaces reflect is left out.
-    #[command(override_usage = "antumbra sun [OPTIONS] -o <OUT> <SENSORS> <SCENE>")]
+    #[command(override_usage = "antumbra sun [OPTIONS] -o <OUT> <SENSORS> <SCENE>...")]
     "sun" Sun(sun::SunArgs),
     /// Find which points see each other, and what observers see
     ///
@@ -64,7 +64,7 @@ command::bakes! {
     /// roof. Directions behind the surface of a sensor count as closed. Cells of a height raster (--cells) are computed exactly, from
     /// its triangles in double precision. Otherwise rays find the angle to less than 0.001 degrees, and may miss surfaces that float
     /// above others and are less than half a degree high.
-    #[command(override_usage = "antumbra horizon [OPTIONS] -o <OUT> <SENSORS> <SCENE>")]
+    #[command(override_usage = "antumbra horizon [OPTIONS] -o <OUT> <SENSORS> <SCENE>...")]
     "horizon" Horizon(horizon::HorizonArgs),
     /// Find how much of the light of a surface arrives at others
     ///

@@ -1,6 +1,6 @@
 //! Sensors that the command line places.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use antumbra::{Bvh, Geometry, Recipe};
 use antumbra_bake::{Flat, Groups, Orientation, Placement, Sensors, UpAxis};
@@ -30,7 +30,7 @@ pub fn check(args: &PlaceArgs) -> Result<(), Failure> {
 }
 
 /// Refuses a raster of results at `path` if sensors are not the cells of one.
-pub fn check_raster(path: &Path, args: &PlaceArgs, scene: &Path) -> Result<(), Failure> {
+pub fn check_raster(path: &Path, args: &PlaceArgs, scene: &[PathBuf]) -> Result<(), Failure> {
     let has_cells = match args.seen_from {
         Some(_) => false,
         None => args.grid.is_some() || args.vertices && raster::is_raster(scene),

@@ -1,15 +1,15 @@
 //! Height rasters that are baked without a mesh and without a tree.
 
-use std::path::Path;
+use std::path::PathBuf;
 use std::time::Instant;
 
 use antumbra::LocalOrigin;
 use antumbra_bake::{HeightField, Sensors, UpAxis};
 use antumbra_lab::count;
-use antumbra_load::{Extent, Heights, MemorySize};
+use antumbra_load::{Extent, Heights, MemorySize, raster_name};
 use antumbra_raster::{Crs, Grid, Site};
 
-use super::raster::is_raster;
+use super::raster::{is_raster, tell_neighbours};
 use super::site::Asked;
 use crate::exit::{Failure, tell};
 use crate::output::Files;
@@ -24,18 +24,18 @@ pub struct Terrain {
 }
 
 /// Whether a scene is a height raster that lies as it does on a map.
-pub fn is_terrain(scene: &Path, up: Option<UpAxis>) -> bool {
+pub fn is_terrain(scene: &[PathBuf], up: Option<UpAxis>) -> bool {
     is_raster(scene) && up.is_none_or(|up| up == UpAxis::Z)
 }
 
 impl Terrain {
-    /// Reads a raster.
-    pub fn load(scene: &Path, memory: MemorySize, files: &mut Files) -> Result<Self, Failure> {
-        let name = scene.file_stem().unwrap_or_default();
-        let name = name.to_string_lossy().into_owned();
+    /// Reads a raster, perhaps of several files.
+    pub fn load(scene: &[PathBuf], memory: MemorySize, files: &mut Files) -> Result<Self, Failure> {
+        let name = raster_name(scene);
         let start = Instant::now();
         let heights = scenes::load_heights(scene, memory)?;
         files.reads_all(&heights.inputs)?;
+        tell_neighbours(scene, &heights.raster.grid);
         let Some(extent) = heights.extent else {
             return Err(Failure::scene(&name, "it has no cell with data"));
         };

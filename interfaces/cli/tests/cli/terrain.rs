@@ -82,6 +82,117 @@ fn results_are_where_the_heights_were() {
     assert!(open.values[40 * 15 + 20] > open.values[40 * 15 + 19]);
 }
 
+/// Cuts the plain into four tiles, and names them from the north west to the south east.
+fn tiles(place: &Place) -> [&'static str; 4] {
+    let (all, heights) = plain();
+    fs::create_dir(place.path("tiles")).expect("a folder");
+    let names = ["tiles/a.tif", "tiles/b.tif", "tiles/c.tif", "tiles/d.tif"];
+    let corners = [[0, 0], [25, 0], [0, 11], [25, 11]];
+    for (name, [column, row]) in names.into_iter().zip(corners) {
+        let width = if column == 0 { 25 } else { 15 };
+        let height = if row == 0 { 11 } else { 19 };
+        let [x, y] = all.corner(column as f64, row as f64);
+        let mut grid = Grid::north_up([width, height], [x, y], 10.0);
+        grid.crs = all.crs.clone();
+        let lines = (row..row + height).map(|y| &heights[40 * y + column..40 * y + column + width]);
+        let values: Vec<f32> = lines.flatten().copied().collect();
+        let quantity = Quantity { name: "", unit: "" };
+        let bytes = write(name.as_ref(), &grid, &values, quantity).expect("a raster");
+        place.write(name, bytes);
+    }
+    names
+}
+
+#[test]
+fn tiles_are_one_raster() {
+    let place = place();
+    let [a, b, c, d] = tiles(&place);
+    place.write("eyes.csv", "x,y\n600055,5339855\n");
+    let same = |scene: &[&str], command: &[&str], output: &str| {
+        let [whole, parts] = ["whole", "parts"].map(|name| format!("{name}.{output}"));
+        let run = |scene: &[&str], output: &str| {
+            let args = [&command[..1], scene, &command[1..], &["-o", output]];
+            place.run(&args.concat()).expect(0).stderr
+        };
+        run(&["dem.tif"], &whole);
+        let said = run(scene, &parts);
+        let line = "4 files are one raster of 40 x 30 cells; in 1 of them no file has data";
+        assert!(said.contains(line) && !said.contains("beside it"), "{said}");
+        let read = |name: &str| fs::read(place.path(name)).expect("a file");
+        assert!(read(&whole) == read(&parts), "{scene:?} {command:?}");
+    };
+    let day = [&["sun"][..], &["--cells"], &SUN].concat();
+    same(&["tiles"], &["horizon", "--cells"], "npy");
+    same(&[c, a, d, b], &["horizon", "--cells"], "npz");
+    same(&["tiles"], &day, "tif");
+    same(&[a, b, c, d], &day, "asc");
+    same(&["tiles"], &["ao", "--samples", "16"], "tif");
+    same(
+        &["tiles"],
+        &["visible", "eyes.csv", "--viewshed", "--eye", "1.7"],
+        "tif",
+    );
+    // Shares know all files again.
+    for share in ["0/2", "1/2"] {
+        let part = format!("{}.part", &share[..1]);
+        place
+            .run(&[
+                "horizon", b, a, d, c, "--cells", "--shard", share, "-o", &part,
+            ])
+            .expect(0);
+    }
+    place
+        .run(&["merge", "0.part", "1.part", "-o", "merged.npz"])
+        .expect(0);
+    let read = |name: &str| fs::read(place.path(name)).expect("a file");
+    assert!(read("merged.npz") == read("parts.npz"));
+    // A tile alone, an output in place of a tile, a file that is no raster, and a folder without any.
+    let alone = place
+        .run(&["horizon", a, "--cells", "-o", "a.npy"])
+        .expect(0);
+    assert!(
+        alone
+            .stderr
+            .contains("tiles/a.tif: cells go on in 3 files beside it, such as b.tif"),
+        "{}",
+        alone.stderr
+    );
+    fs::create_dir(place.path("empty")).expect("a folder");
+    for (args, code, words) in [
+        (
+            &[
+                "horizon",
+                "tiles",
+                "--cells",
+                "--azimuths",
+                "1",
+                "-o",
+                "tiles/c.tif",
+            ][..],
+            2,
+            "would destroy",
+        ),
+        (
+            &["horizon", a, "eyes.csv", "--cells", "-o", "h.npy"],
+            2,
+            "eyes.csv: it is no height raster",
+        ),
+        (
+            &["horizon", "empty", "--cells", "-o", "h.npy"],
+            65,
+            "without a height raster",
+        ),
+        (
+            &["horizon", a, a, "missing.tif", "--cells", "-o", "h.npy"],
+            65,
+            "missing.tif",
+        ),
+    ] {
+        let run = place.run(args).expect(code);
+        assert!(run.stderr.contains(words), "{}", run.stderr);
+    }
+}
+
 #[test]
 fn a_grid_on_a_mesh_is_a_raster() {
     let place = place();

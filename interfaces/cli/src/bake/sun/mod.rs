@@ -31,7 +31,7 @@ use super::places::{self, Places};
 use super::site::Asked;
 use super::terrain::{Terrain, is_terrain};
 use crate::args::{
-    ChunkArgs, MapArgs, PlaceArgs, RasterArgs, SCENE, SCENE_LONG, TimeArgs, heading,
+    ChunkArgs, MapArgs, PlaceArgs, RasterArgs, SCENE, TimeArgs, heading, rasters_long,
     values as checked,
 };
 use crate::exit::Failure;
@@ -47,8 +47,8 @@ use when::{When, read_weather};
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("where").required(true))]
 pub struct SunArgs {
-    #[arg(help = SCENE, long_help = SCENE_LONG)]
-    pub scene: PathBuf,
+    #[arg(required = true, help = SCENE, long_help = rasters_long())]
+    pub scene: Vec<PathBuf>,
     /// Result: .csv, .ply, .npz, .png, .svg, .pdf or .tif
     ///
     /// May be given several times. A .csv has a line per sensor, a .ply the mesh or the sensors in colours, a .png, .svg

@@ -36,7 +36,7 @@ impl Baked<'_> {
         if let Some(name) = &args.places.only {
             title += &format!(", {name}");
         }
-        let files = [Some(&args.scene), args.epw.as_ref()];
+        let files = [args.scene.first(), args.epw.as_ref()];
         Words {
             title,
             subtitle: subtitle.join("  ·  "),

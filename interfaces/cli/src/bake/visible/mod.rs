@@ -11,7 +11,7 @@ use antumbra::{Aabb, LocalOrigin};
 use antumbra_bake::{Array, BitMatrix, Entry, Eyes, Orientation, Sensors, UpAxis, VisibilityJob};
 use antumbra_lab::count;
 use antumbra_raster::{Quantity, unit_name};
-use clap::{ArgGroup, Args, ValueEnum};
+use clap::{ArgAction, ArgGroup, Args, ValueEnum};
 
 use super::command::{Bake, Baking, Done, Figure, Named};
 use super::files::{self, Column, Format};
@@ -54,8 +54,8 @@ impl Shown {
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("surface"))]
 pub struct VisibleArgs {
-    #[arg(help = SCENE, long_help = SCENE_LONG)]
-    pub scene: PathBuf,
+    #[arg(required = true, num_args = 1, action = ArgAction::Set, help = SCENE, long_help = SCENE_LONG)]
+    pub scene: Vec<PathBuf>,
     /// Points that look: x, y [, z] [, nx, ny, nz]
     ///
     /// Points without the column of heights (z, or y where y is up) are put on the surface that is seen from above.
@@ -397,7 +397,7 @@ fn write(
                     quantity: "Observers that see the place",
                     unit: "",
                     whole: true,
-                    files: vec![&args.scene, &args.from],
+                    files: vec![&args.scene[0], &args.from],
                 };
                 map::Sheet::new(&args.map, plan, rows)?.write(path, &words, &values)
             }
