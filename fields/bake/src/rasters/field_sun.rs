@@ -7,7 +7,6 @@ use antumbra_terrain::angles::sin_cos_degrees;
 use antumbra_terrain::{HeightField, Shadows, per_cell};
 
 use crate::sun::sunlight::{Lights, Received, facing};
-use crate::vector::dot;
 use crate::{
     Answers, BitMatrix, Error, Job, Key, Monitor, Progress, Size, SunFound, SunValues, Sunlight,
     memory, ones,
@@ -191,14 +190,7 @@ impl<'a> FieldSunJob<'a> {
         let Some(normal) = normal.filter(|_| lit != 0) else {
             return;
         };
-        let mut faced = 0;
-        for bit in ones(&[lit]) {
-            let light = first + bit;
-            if dot(normal, self.lights.direction(light)) > 0.0 {
-                faced |= 1 << bit;
-                self.lights.add(received, normal, light);
-            }
-        }
+        let faced = self.lights.add(received, normal, (first, lit), true);
         if let Some(seen) = seen {
             *seen = faced;
         }

@@ -377,42 +377,79 @@ impl<'a> Lights<'a> {
         self.to_suns.len() + self.sunlight.patches.len()
     }
 
-    /// Direction to a sun, or to one of the patches behind them, in terms of east, north and up.
-    pub fn direction(&self, light: usize) -> [f64; 3] {
-        match light.checked_sub(self.to_suns.len()) {
-            None => self.to_suns[light],
-            Some(patch) => self.sunlight.patches.centres[patch],
+    /// Adds what a surface with this normal receives from those of 64 lights that it sees; `first` is the number of the lowest bit. If
+    /// `has_plane`, it sees none behind its plane. Returns the lights that it sees then.
+    pub fn add(
+        &self,
+        received: &mut Received,
+        normal: [f64; 3],
+        (first, seen): (usize, u64),
+        has_plane: bool,
+    ) -> u64 {
+        let suns = self.to_suns.len();
+        let Suns {
+            hours,
+            months,
+            direct,
+            ..
+        } = &self.sunlight.suns;
+        let mut left = seen;
+        let mut faced = 0;
+        // In registers, since there may be billions.
+        let mut sums = [received.hours, received.direct];
+        while left != 0 {
+            let bit = left.trailing_zeros();
+            let light = first + bit as usize;
+            if light >= suns {
+                break;
+            }
+            left &= left - 1;
+            let cosine = dot(normal, self.to_suns[light]);
+            if has_plane && !(cosine > 0.0) {
+                continue;
+            }
+            faced |= 1 << bit;
+            let beam = direct[light] * cosine.max(0.0);
+            sums = [sums[0] + hours[light], sums[1] + beam];
+            if let Some(by_month) = &mut received.by_month {
+                by_month[0][months[light]] += hours[light];
+                by_month[1][months[light]] += beam;
+            }
         }
+        [received.hours, received.direct] = sums;
+        for bit in ones(&[left]) {
+            faced |=
+                u64::from(self.add_patch(received, normal, first + bit - suns, has_plane)) << bit;
+        }
+        faced
     }
 
-    /// Adds what a surface with this normal receives from a light that it sees.
-    pub fn add(&self, received: &mut Received, normal: [f64; 3], light: usize) {
-        let Sunlight { suns, patches, .. } = self.sunlight;
-        if let Some(patch) = light.checked_sub(self.to_suns.len()) {
-            received.view += patches.weight(patch, normal, Weighting::Cosine);
-            received.open += patches.weight(patch, normal, Weighting::Uniform);
-            let Some(sky) = &self.sky else {
-                return;
-            };
-            let cosine = dot(patches.centres[patch], normal).max(0.0);
+    /// Adds what a surface receives from a patch of the sky, unless that is behind its plane.
+    fn add_patch(
+        &self,
+        received: &mut Received,
+        normal: [f64; 3],
+        patch: usize,
+        has_plane: bool,
+    ) -> bool {
+        let patches = &self.sunlight.patches;
+        let cosine = dot(patches.centres[patch], normal);
+        if has_plane && !(cosine > 0.0) {
+            return false;
+        }
+        let cosine = cosine.max(0.0);
+        received.view += patches.solid_angles[patch] * cosine;
+        received.open += patches.solid_angles[patch];
+        if let Some(sky) = &self.sky {
             let of = |radiances: &[f64]| radiances[patch] * patches.solid_angles[patch] * cosine;
             received.diffuse += of(&sky.of_all);
             if let Some(months) = &mut received.by_month {
                 let known = sky.by_month.iter().zip(&mut months[2]);
-                known
-                    .filter(|(sky, _)| !sky.is_empty())
-                    .for_each(|(sky, diffuse)| *diffuse += of(sky));
+                let known = known.filter(|(sky, _)| !sky.is_empty());
+                known.for_each(|(sky, diffuse)| *diffuse += of(sky));
             }
-            return;
         }
-        let (hours, month) = (suns.hours[light], suns.months[light]);
-        let beam = suns.direct[light] * dot(normal, self.to_suns[light]).max(0.0);
-        received.hours += hours;
-        received.direct += beam;
-        if let Some(months) = &mut received.by_month {
-            months[0][month] += hours;
-            months[1][month] += beam;
-        }
+        true
     }
 }
 
@@ -551,7 +588,9 @@ impl Job for SunJob<'_> {
             let normal = facing(self.facing.get(row).copied(), &self.sunlight.orientation);
             let received = normal.map(|normal| {
                 let mut received = Received::new(true);
-                ones(words).for_each(|light| lights.add(&mut received, normal, light));
+                for (word, &seen) in words.iter().enumerate() {
+                    lights.add(&mut received, normal, (64 * word, seen), false);
+                }
                 received
             });
             values.push(&lights, received.as_ref());

@@ -33,7 +33,7 @@ use crate::angles::check_azimuths;
 use crate::{Error, HeightField, Monitor, Progress, memory};
 pub use planes::per_cell;
 use planes::turn;
-use ray::Ray;
+use ray::{NEAR, Ray};
 use strips::{LANES, Strips};
 
 /// Which cells of a height field get light from far away, such as from the sun or from a part of the sky.
@@ -147,6 +147,8 @@ struct Grid {
     heights: Vec<f32>,
     /// The same, but NaN for cells that are not joined to all neighbours with data; empty if there are none.
     joined: Vec<f32>,
+    /// For each row, whether some columns at a time are near a cell without data; empty if all have data.
+    gaps: Vec<bool>,
 }
 
 impl Grid {
@@ -178,13 +180,37 @@ impl Grid {
                 joined[row * stride + PAD + column] = f32::NAN;
             }
         }
+        let mut gaps = Vec::new();
+        if field.has_holes() {
+            let chunks = columns.div_ceil(LANES);
+            gaps = memory::filled("gaps", rows * chunks, false)?;
+            for row in 0..rows {
+                for index in 0..chunks {
+                    let own = &heights[row * stride + PAD + LANES * index..];
+                    let count = LANES.min(columns - LANES * index);
+                    if own[..count].iter().any(|height| height.is_nan()) {
+                        // Crossings near a cell are at most so many rows and columns away.
+                        for row in row.saturating_sub(NEAR)..(row + NEAR + 1).min(rows) {
+                            let near = index.saturating_sub(1)..(index + 2).min(chunks);
+                            gaps[row * chunks..][near].fill(true);
+                        }
+                    }
+                }
+            }
+        }
         Ok(Self {
             columns,
             rows,
             stride,
             heights,
             joined,
+            gaps,
         })
+    }
+
+    /// Whether one of so many columns of a row is near a cell without data.
+    fn has_gap(&self, row: usize, index: usize) -> bool {
+        !self.gaps.is_empty() && self.gaps[row * self.columns.div_ceil(LANES) + index]
     }
 
     /// Heights of cells that are joined to all neighbours with data.

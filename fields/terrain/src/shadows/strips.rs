@@ -368,18 +368,19 @@ impl<'a> Strips<'a> {
                     break;
                 }
                 let edges = highest(simd, &edges, index, none);
-                let most = highest(simd, &more, index, edges);
-                most.store(chunk(near, at));
+                let (mut near_most, mut near_sure) = (edges, edges);
+                if grid.has_gap(own_row, index) {
+                    near_most = highest(simd, &more, index, edges);
+                    if !grid.joined.is_empty() {
+                        near_sure = highest(simd, &joined, index, none);
+                    }
+                }
+                near_most.store(chunk(near, at));
                 let strip = line - 1 + at;
                 let far =
                     load::<S>(simd, &self.now, strip).max(load::<S>(simd, &self.before, strip));
-                let most = far.max(most) + slack;
-                let edges = if grid.joined.is_empty() {
-                    edges
-                } else {
-                    highest(simd, &joined, index, none)
-                };
-                let sure = load::<S>(simd, &self.sure, strip).max(edges) - slack;
+                let most = far.max(near_most) + slack;
+                let sure = load::<S>(simd, &self.sure, strip).max(near_sure) - slack;
                 let own = Vector::<S>::load(simd, &heights[index]) + Vector::<S>::splat(simd, key);
                 // NaN is neither lit nor open.
                 lit |= u64::from(most.lt(own).bits()) << (LANES * part);
