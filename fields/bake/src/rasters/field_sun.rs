@@ -177,7 +177,7 @@ impl<'a> FieldSunJob<'a> {
         })
     }
 
-    /// Adds what a cell receives from those of 64 lights that it sees and faces, and notes them.
+    /// Adds what a cell receives from the lights of 64 that it sees and faces, and notes them.
     fn add(
         &self,
         received: &mut Received,

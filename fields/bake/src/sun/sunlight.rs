@@ -377,7 +377,7 @@ impl<'a> Lights<'a> {
         self.to_suns.len() + self.sunlight.patches.len()
     }
 
-    /// Adds what a surface with this normal receives from those of 64 lights that it sees; `first` is the number of the lowest bit. If
+    /// Adds what a surface with this normal receives from the lights of 64 that it sees; `first` is the number of the lowest bit. If
     /// `has_plane`, it sees none behind its plane. Returns the lights that it sees then.
     pub fn add(
         &self,

@@ -3,15 +3,15 @@
 //! # Strips
 //!
 //! All rays towards a light are parallel. In plan, lines along them that are one column apart at a row are one column apart at every row,
-//! and divide the raster into strips. Places on a ray differ in height by as much as it climbs, so each place has a *key*: its height
-//! plus what a ray from there to the light loses. A cell is in shadow if the surface ahead of it has a larger key.
+//! and divide the raster into strips. Each place has a *key*: its height plus as much as a ray climbs on the way from it to the side of
+//! the light. So places on a ray have one key, and a cell is in shadow if the surface ahead of it has a larger one.
 //!
 //! A sweep walks from the light from row to row (columns where rays are nearer to these) and keeps two keys for each strip. The highest key
 //! of everything in the strip is at the crossings of both lines with edges of triangles or at a cell between them, since the surface
-//! is straight elsewhere. No ray of the strip can meet a higher one. And no ray can pass below the lowest key that the surface has across
+//! is straight elsewhere. No ray of the strip can reach a higher one. And no ray can pass below the lowest key that the surface has across
 //! the whole strip at any row. A cell above the first key is lit and one below the second key is dark, which decides nine cells of ten
 //! for a few vector operations however far it looks. Crossings with the nearest rows are at the same offsets for all cells of a row, and
-//! are taken one by one instead, because a strip next to the cell is as wide as what it tells apart.
+//! are taken one by one instead, because next to a cell a strip is as wide as what it distinguishes.
 //!
 //! # Exactness
 //!
@@ -90,23 +90,12 @@ impl<'a> Shadows<'a> {
         check_azimuths(&[azimuth])?;
         let wanted = "the tangent of an elevation";
         Error::check_range("slope", slope, !slope.is_nan(), wanted)?;
-        let [width, height] = self.field.size();
-        let nothing =
-            |rows: usize, columns: usize| memory::filled("words", rows * columns.div_ceil(64), 0);
-        if self.rise < 0.0 || slope.is_infinite() {
-            let mut plane = nothing(height, width)?;
-            if self.rise >= 0.0 && slope > 0.0 {
-                for (cell, height) in self.field.heights().iter().enumerate() {
-                    let bit = u64::from(height.is_finite()) << (cell % width % 64);
-                    plane[cell / width * width.div_ceil(64) + cell % width / 64] |= bit;
-                }
-            }
-            return Ok(plane);
-        }
-        let ray = Ray::new(self, azimuth, slope);
+        let ray = Ray::new(self, azimuth, slope.clamp(-STEEP, STEEP));
         let Grid { columns, rows, .. } = self.grids[usize::from(ray.is_turned)];
-        let mut plane = nothing(rows, columns)?;
-        Isa::best().dispatch(Strips::new(self, &ray, &mut plane)?);
+        let mut plane = memory::filled("words", rows * columns.div_ceil(64), 0)?;
+        if self.rise >= 0.0 && slope > f64::NEG_INFINITY {
+            Isa::best().dispatch(Strips::new(self, &ray, &mut plane)?);
+        }
         match ray.is_turned {
             true => turn(&plane, [columns, rows]),
             false => Ok(plane),
@@ -134,6 +123,9 @@ impl<'a> Shadows<'a> {
         planes.collect()
     }
 }
+
+/// A slope that is as good as infinite, and whose keys are finite in single precision.
+const STEEP: f64 = 1e20;
 
 /// Numbers before the first column, which no crossing near a cell exceeds.
 const PAD: usize = 8;

@@ -84,12 +84,7 @@ impl<'a> Ray<'a> {
 
     /// Whether an edge of at least and at most so many rows away is in the way of a cell.
     pub fn is_hidden(&self, eye: &Eye, from: usize, to: usize) -> bool {
-        let at = |rows: usize| {
-            self.starts
-                .get(rows)
-                .copied()
-                .unwrap_or(self.crossings.len())
-        };
+        let at = |rows: usize| *self.starts.get(rows).unwrap_or(&self.crossings.len());
         // At most four edges meet the ray in one place.
         let range = at(from)..(at(to) + 4).min(self.crossings.len());
         let taps = &self.taps[range.start.min(range.end)..range.end];

@@ -421,20 +421,13 @@ impl<'a> Strips<'a> {
 /// Numbers of a list from a place on.
 #[inline(always)]
 fn load<S: Simd + Width<LANES>>(simd: S, list: &[f32], at: usize) -> Vector<S> {
-    Vector::<S>::load(
-        simd,
-        list[at..]
-            .first_chunk()
-            .expect("a list as long as the strips"),
-    )
+    Vector::<S>::load(simd, list[at..].first_chunk().expect("room behind"))
 }
 
 /// The same, to be changed.
 #[inline(always)]
 fn chunk(list: &mut [f32], at: usize) -> &mut [f32; LANES] {
-    list[at..]
-        .first_chunk_mut()
-        .expect("a list as long as the strips")
+    list[at..].first_chunk_mut().expect("room behind")
 }
 
 impl WithSimd<LANES> for Strips<'_> {
