@@ -194,6 +194,65 @@ fn tiles_are_one_raster() {
 }
 
 #[test]
+fn cells_have_the_same_sun_in_all_files_and_from_shards() {
+    let place = place();
+    let sun = |args: &[&str]| {
+        let all = [
+            &["sun", "dem.tif", "--cells", "--step", "20"],
+            args,
+            &SUN[..],
+        ]
+        .concat();
+        place.run(&all).expect(0);
+    };
+    sun(&[
+        "-o",
+        "a.npy",
+        "-o",
+        "a.csv",
+        "-o",
+        "a.npz",
+        "-o",
+        "a.ply",
+        "--hourly",
+        "steps.csv",
+        "--groups",
+        "groups.csv",
+    ]);
+    sun(&["-o", "0.part", "--shard", "0/2"]);
+    sun(&["-o", "1.part", "--shard", "1/2"]);
+    place
+        .run(&["merge", "0.part", "1.part", "-o", "b.npy"])
+        .expect(0);
+    let bytes = |name: &str| fs::read(place.path(name)).expect("a file");
+    assert_eq!(bytes("a.npy"), bytes("b.npy"));
+    let text = |name: &str| fs::read_to_string(place.path(name)).expect("a file");
+    let table = text("a.csv");
+    let column = |text: &str, name: &str| -> Vec<f64> {
+        let mut lines = text.lines();
+        let head = lines.next().expect("a head");
+        let at = head
+            .split(',')
+            .position(|own| own == name)
+            .expect("a column");
+        let number = |line: &str| line.split(',').nth(at).and_then(|x| x.parse().ok());
+        lines.map(|line| number(line).expect("a number")).collect()
+    };
+    let hours = column(&table, "hours");
+    assert_eq!(hours.len(), 40 * 30 - 1);
+    assert_eq!(hours, column(&table, "hours_06"));
+    // Steps of time add up to the hours of each sensor.
+    let steps = text("steps.csv");
+    for sensor in [1, 500, 1199] {
+        let sum: f64 = column(&steps, &sensor.to_string()).iter().sum();
+        assert!((sum - hours[sensor - 1]).abs() < 1e-4, "{sensor}: {sum}");
+    }
+    let means = column(&text("groups.csv"), "hours_mean");
+    let mean = hours.iter().sum::<f64>() / hours.len() as f64;
+    assert!((means[0] - mean).abs() < 1e-3, "{means:?} {mean}");
+}
+
+#[test]
 fn a_grid_on_a_mesh_is_a_raster() {
     let place = place();
     place.write(

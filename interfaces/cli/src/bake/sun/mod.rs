@@ -287,28 +287,7 @@ impl SunArgs {
         terrain.tell_read();
         let site = terrain.settle(&Asked::new(&self.raster, &self.places))?;
         let (when, sunlight) = When::at(self, weather, site, UpAxis::Z)?;
-        let start = Instant::now();
-        let field = terrain.field()?;
-        let north = self.places.north.degrees();
-        let rise = self.places.placement.height / self.places.units.metres();
-        let is = |kinds: &[&str]| self.output.iter().any(|path| is_one_of(path, kinds));
-        let by_month = is(&["csv", "npz"]);
-        let job = FieldSunJob::new(&field, &sunlight, (rise, north), by_month)?;
-        let mut sensors = terrain.sensors(rise);
-        sensors.normals = job.normals();
-        let build_seconds = start.elapsed().as_secs_f64();
-        let done = match bake.is_whole() {
-            true => {
-                let (start, keeps) = (Instant::now(), is(&["npz"]) || self.hourly.is_some());
-                input::check_answers(&terrain.name, job.memory(keeps))?;
-                let progress = Progress::new(&terrain.name);
-                let found = job.whole(keeps, &progress);
-                progress.finish();
-                Done::whole(found?, start.elapsed().as_secs_f64())
-            }
-            false => bake.compute_cells(&job, &terrain.name)?,
-        };
-        let has_mesh = self.groups.is_some() || is(&["ply"]);
+        let has_mesh = self.groups.is_some() || self.writes(&["ply"]);
         let ground = has_mesh.then(|| bake.ground(&mut files, None));
         let ground = ground.transpose()?.map(|mut ground| {
             if self.groups.is_some() {
@@ -318,6 +297,19 @@ impl SunArgs {
             places.map(|places| (ground, places))
         });
         let ground = ground.transpose()?;
+        let start = Instant::now();
+        let field = terrain.field()?;
+        let north = self.places.north.degrees();
+        let rise = self.places.placement.height / self.places.units.metres();
+        let by_month = self.writes(&["csv", "npz"]);
+        let job = FieldSunJob::new(&field, &sunlight, (rise, north), by_month)?;
+        let mut sensors = terrain.sensors(rise);
+        sensors.normals = job.normals();
+        let build_seconds = start.elapsed().as_secs_f64();
+        let done = match bake.is_whole() {
+            true => self.whole(&job, &terrain.name)?,
+            false => bake.compute_cells(&job, &terrain.name)?,
+        };
         let baked = Baked {
             name: &terrain.name,
             mesh: ground.as_ref().map(|(ground, places)| (ground, places)),
@@ -335,6 +327,21 @@ impl SunArgs {
         let directions = sunlight.suns.times.len() + sunlight.patches.len();
         let rays = (directions * sensors.points.len()) as u64;
         baked.end(bake, (field.triangles(), rays, seconds, begin), &done)
+    }
+
+    /// Computes all of a job with little memory.
+    fn whole(&self, job: &FieldSunJob<'_>, name: &str) -> Result<Done<SunFound>, Failure> {
+        let keeps = self.writes(&["npz"]) || self.hourly.is_some();
+        input::check_answers(name, job.memory(keeps))?;
+        let (start, progress) = (Instant::now(), Progress::new(name));
+        let found = job.whole(keeps, &progress);
+        progress.finish();
+        Ok(Done::whole(found?, start.elapsed().as_secs_f64()))
+    }
+
+    /// Whether an output has one of these extensions.
+    fn writes(&self, kinds: &[&str]) -> bool {
+        self.output.iter().any(|path| is_one_of(path, kinds))
     }
 
     /// Light from the ground, if it is wanted.
