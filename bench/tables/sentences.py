@@ -306,6 +306,14 @@ SOURCES = {
         ("at least 200 000 triangles", "science/bench/src/calls/motion.rs", "builtin:city:200000"),
         ("each instance 5120", "science/bench/src/calls/motion.rs", "icosphere(4)"),
     ],
+    "docs/src/atlas.md": [
+        ("GeoTIFFs in EPSG:32633", "bench/atlas/terrains.py", "EPSG:32633"),
+        ("400 horizons and 1000 lines of sight for each terrain", "setting"),
+        ("2000 m from the lowest to the highest cell", "bench/atlas/terrains.py", "fractal(n, 4.0, 1) * 2000"),
+        ("more than 0.1 and by more than 1 degree", "setting"),
+        ("Four eyes, 1.7 above the cells", "bench/atlas/tools.py", "EYE = 1.7"),
+        ("azimuth 112.5 and 25 degrees high, and at azimuth 247.5", "bench/atlas/atlas.py", "((112.5, 25.0), (247.5, 12.0))"),
+    ],
     "docs/src/gallery/standard.md": [
         ("CC BY 3.0", "cited"),
         ("CC BY-SA 4.0", "cited"),
