@@ -6,7 +6,7 @@
 
 Terrains are made in FOLDER. Tools that are not installed are left out, and the record says why.
 Needs numpy and rasterio, and of the tools those that you have: gdal-bin, grass-core and saga of Debian,
-and `pip install xarray-spatial topocalc geopandas`, `pip install --no-deps rvt-py umep solweig insolation`.
+and the packages that `docs/src/atlas.md` installs.
 """
 
 import argparse

@@ -121,6 +121,8 @@ def other_sky(t):
 
 def tiles(t, rim, answer):
     """Joins the answers for chunks of 256 x 256 cells, each with a rim as dask.array.map_overlap gives it."""
+    if max(t.z.shape) <= 256:
+        raise ValueError("the raster is one chunk and needs no rim")
     joined, seconds = None, 0
     for row in range(0, t.z.shape[0], 256):
         for column in range(0, t.z.shape[1], 256):
