@@ -23,7 +23,7 @@ REPLICATION, PERFORMANCE, COSTS = (f"docs/src/{n}.md" for n in ("replication", "
 # Figures of a group of pages may be on any of them.
 RESULTS = ("docs/src/results.md", "docs/src/beyond-static-order.md")
 ORDER, EMBREE = (f"docs/src/{n}.md" for n in ("occlusion-order", "order-in-embree"))
-BAKING = tuple(f"docs/src/{n}.md" for n in ("occlusion-baking", "bakes", "sun-and-sky", "visibility", "horizons"))
+BAKING = tuple(f"docs/src/{n}.md" for n in ("occlusion-baking", "bakes", "sun-and-sky", "visibility", "rasters", "horizons"))
 PYTHON = ("docs/src/python/index.md", "docs/src/python/scenes.md")
 RELIABILITY, BENCH = "docs/src/reliability.md", "bench/performance.md"
 MOVING = "docs/src/moving-scenes.md"
