@@ -356,9 +356,9 @@ fn heights_and_angles_of_a_wall_are_those_of_its_shadow() {
         "{table}"
     );
     // Cells of height 0 are those that somebody sees, and have an angle.
-    show(&["-o", "seen.npy"]).expect(0);
+    show(&["-o", "seen.tif"]).expect(0);
     show(&["--show", "angle", "-o", "angle.tif"]).expect(0);
-    let (seen, angle) = (place.raster("seen.npy"), place.raster("angle.tif"));
+    let (seen, angle) = (place.raster("seen.tif"), place.raster("angle.tif"));
     for (cell, &height) in high.values.iter().enumerate() {
         assert_eq!(height == 0.0, seen.values[cell] > 0.0, "{cell}");
         assert_eq!(height == 0.0, !angle.values[cell].is_nan(), "{cell}");
