@@ -29,7 +29,6 @@ fn sunlight() -> Sunlight {
         step.irradiance = Irradiance {
             direct_normal: 700.0,
             diffuse_horizontal: 90.0,
-            ..Irradiance::default()
         };
     }
     let patches = SkyDivision::Tregenza.patches().expect("patches");

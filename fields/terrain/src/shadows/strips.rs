@@ -440,7 +440,7 @@ impl WithSimd<LANES> for Strips<'_> {
                 self.take(simd, taken);
             }
             self.judge(simd, row);
-            if row >= NEAR && (row - NEAR + 1) % BLOCK == 0 {
+            if row >= NEAR && (row - NEAR + 1).is_multiple_of(BLOCK) {
                 self.end_block(row - NEAR);
             }
         }
