@@ -25,6 +25,7 @@
 //! | where is the sun | [`sun_positions`], [`Orientation::direction`] | angles, a direction in the scene |
 //! | which suns does each point see, and for how long | [`sees_directions`], [`sun_hours`] | [`BitMatrix`], points x suns; `f64` |
 //! | how much energy does each point receive from the sun and the sky | [`SunJob`], [`run`] | [`SunValues`] |
+//! | the same for the cells of a height raster | [`FieldSunJob`], [`FieldSunJob::whole`] | [`SunValues`] |
 //! | how much of the light of a surface arrives at others | [`view_factors`], [`ViewFactorJob`] | `f64`, surfaces x surfaces |
 //! | which cells of a height raster does each observer see | [`ViewshedJob`], [`run`] | [`Viewsheds`] |
 //! | how high must something on a cell be until an observer sees it | [`TargetHeightJob`], [`run`] | a number for each cell |
@@ -62,7 +63,7 @@
 //!
 //! # Jobs
 //!
-//! Long bakes are jobs: [`OcclusionJob`], [`SunJob`], [`HorizonJob`], [`FieldHorizonJob`], [`ViewFactorJob`], [`VisibilityJob`] and
+//! Long bakes are jobs: [`OcclusionJob`], [`SunJob`], [`HorizonJob`], [`FieldHorizonJob`], [`FieldSunJob`], [`ViewFactorJob`], [`VisibilityJob`] and
 //! [`ViewshedJob`]. A [`Job`] has numbered items, and
 //! [`Work`] computes them in chunks, which can be kept in files, resumed, and shared among machines. [`learn_when_it_pays`] makes
 //! a tree that learned from rays of the job. [`Sensors`] and [`Atlas`] make points of meshes, grids, tables and textures.
@@ -78,7 +79,7 @@
 //!   bit per answer;  `directions`: directions over a hemisphere;  `curvature`: lines of sight over a round earth
 //! - `sun`: `position`: where the sun is;  `sky`, `perez`: the sky in patches, and its light;  `moment`, `clock`, `epw`: dates, time
 //!   zones, weather files;  `sunlight`: the job of a period;  `exposure`, `hourly`, `measures`: sums, steps and classes
-//! - `rasters`: `viewshed`, `field_horizon`: jobs of height rasters, which `antumbra-terrain` answers without rays
+//! - `rasters`: `viewshed`, `field_horizon`, `field_sun`: jobs of height rasters, which `antumbra-terrain` answers without rays
 //! - `files`: `npz`: arrays for numpy;  `ply`, `glb`: meshes with a value at every vertex
 //! - `vector`, `orientation`: vectors, and where up and north are in a scene
 //! - `error`: why there is no result

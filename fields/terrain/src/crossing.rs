@@ -3,6 +3,9 @@
 use crate::HeightField;
 use crate::height_field::families;
 
+/// Parts of an edge from its ends at which a line crosses a corner, more than places are rounded.
+const CLOSE: f64 = 1e-10;
+
 /// A crossing of a line of sight with an edge, seen from the centre of a cell.
 pub(crate) struct Crossing {
     /// Columns and rows from the eye to both ends of the edge, which are one if the line crosses a corner.
@@ -41,7 +44,12 @@ impl Crossing {
                     [_, sign] => [low, sign * (line - low)],
                 };
                 let second = [first[0] + along[0], first[1] + along[1]];
-                let ends = [first, if part == 0.0 { first } else { second }];
+                // Lines along cells pass through their centres, whatever rounding says.
+                let (ends, part) = match part {
+                    part if part < CLOSE => ([first; 2], 0.0),
+                    part if part > 1.0 - CLOSE => ([second; 2], 0.0),
+                    part => ([first, second], part),
+                };
                 let is_in = |end: &[isize; 2]| end[0].abs() <= most[0] && end[1].abs() <= most[1];
                 if distance > reach || !ends.iter().all(is_in) {
                     // Beyond all cells, as is all behind it.

@@ -1,6 +1,6 @@
 //! Shadows against horizons, which come from all crossings in double precision.
 
-use antumbra_terrain::{HeightField, March, Shadows, per_cell};
+use antumbra_terrain::{HeightField, Lattice, March, Shadows, per_cell};
 use antumbra_testkit::Rng;
 
 /// Heights of a plain with towers, and with holes for this part of the cells.
@@ -32,21 +32,25 @@ fn cells_are_lit_where_their_horizon_is_below_the_light() {
         [7e6, 1.0, 0.3, 3e5, 0.1, -1.0],
     ];
     let mut counts = [0; 2];
-    for round in 0..120 {
+    for round in 0..160 {
         let mut unit = || f64::from(random.unit());
         let size = [0, 1].map(|_| 1 + (unit() * 70.0) as usize);
         let holes = if round % 3 == 0 { 0.0 } else { 0.1 * unit() };
         let rise = if round % 5 == 0 { unit() } else { 0.0 };
-        let direction = |_| {
-            let azimuth = match unit() < 0.25 {
-                true => 45.0 * (unit() * 8.0).floor(),
-                false => 360.0 * unit(),
+        let heights = plain(&mut random, size[0] * size[1], holes);
+        let field = HeightField::new(size, &heights, transforms[round % 4]).expect("a field");
+        // Half of them along lines of cells, where rays touch corners and run along borders, also in turned rasters.
+        let lattice = Lattice::new(&field, [8, 16, 32, 80][round % 4]).expect("a lattice");
+        let mut unit = || f64::from(random.unit());
+        let direction = |index| {
+            let place = unit();
+            let azimuth = match index % 2 {
+                0 => lattice.azimuths[(place * lattice.azimuths.len() as f64) as usize],
+                _ => 360.0 * place,
             };
             [azimuth, (80.0 * unit() - 1.0).to_radians().tan()]
         };
         let directions: Vec<[f64; 2]> = (0..8).map(direction).collect();
-        let heights = plain(&mut random, size[0] * size[1], holes);
-        let field = HeightField::new(size, &heights, transforms[round % 4]).expect("a field");
         let shadows = Shadows::new(&field, rise).expect("shadows");
         let planes = shadows.all_lit(&directions, &()).expect("planes");
         let mut seen = vec![0; heights.len()];
@@ -99,6 +103,13 @@ fn lights_that_are_nowhere_and_at_the_zenith() {
     assert_eq!(lit(0.0, f64::INFINITY), Ok(vec![0b011, 0b111]));
     assert_eq!(lit(0.0, f64::NEG_INFINITY), Ok(vec![0, 0]));
     assert_eq!(lit(0.0, 1e16), Ok(vec![0b011, 0b111]));
+    let marked = [0.0, -3.4e38, 1.0, 2.0];
+    let marked =
+        HeightField::new([2, 2], &marked, [0.0, 1.0, 0.0, 0.0, 0.0, -1.0]).expect("a field");
+    assert!(
+        Shadows::new(&marked, 0.0).is_err(),
+        "a mark of missing data"
+    );
     assert!(lit(f64::NAN, 1.0).is_err() && lit(0.0, f64::NAN).is_err());
     let buried = Shadows::new(&field, -1.0).expect("shadows");
     assert_eq!(buried.lit(0.0, 1.0), Ok(vec![0, 0]));

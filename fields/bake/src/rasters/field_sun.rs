@@ -8,8 +8,7 @@ use antumbra_terrain::{HeightField, Shadows, per_cell};
 
 use crate::sun::sunlight::{Lights, Received, facing};
 use crate::{
-    Answers, BitMatrix, Error, Job, Key, Monitor, Progress, Size, SunFound, SunValues, Sunlight,
-    memory, ones,
+    Answers, BitMatrix, Error, Job, Key, Monitor, Size, SunFound, SunValues, Sunlight, memory,
 };
 
 /// Job of [`SunValues`] of the cells of a height field, as of [`SunJob`](crate::SunJob), but by [`Shadows`]: exact, without rays, and
@@ -107,19 +106,13 @@ impl<'a> FieldSunJob<'a> {
     /// # Errors
     /// [`Error::NoMemory`], [`Error::Cancelled`].
     pub fn whole(&self, keeps: bool, monitor: &dyn Monitor) -> Result<SunFound, Error> {
-        let batches = self.directions.len().div_ceil(BATCH);
-        let progress = Progress::new(monitor, self.directions.len());
-        self.sums(
-            keeps,
-            (0..batches).map(|batch| {
-                let first = BATCH * batch;
-                let directions =
-                    &self.directions[first..(first + BATCH).min(self.directions.len())];
-                let planes = self.shadows.all_lit(directions, &Quiet(monitor))?;
-                progress.add(directions.len());
-                Ok(planes)
-            }),
-        )
+        let total = self.directions.len();
+        let batches = self.directions.chunks(BATCH).enumerate();
+        let planes = batches.map(|(batch, directions)| {
+            let monitor = Batch(monitor, [BATCH * batch, total]);
+            Ok(self.shadows.all_lit(directions, &monitor)?)
+        });
+        self.sums(keeps, planes)
     }
 
     /// Sums over planes, which come in batches.
@@ -130,8 +123,7 @@ impl<'a> FieldSunJob<'a> {
     ) -> Result<SunFound, Error> {
         let [width, _] = self.field.size();
         let cells = self.normals.len();
-        let lights = self.lights.len();
-        let mut seen = BitMatrix::new(if keeps { cells } else { 0 }, lights)?;
+        let mut seen = BitMatrix::new(if keeps { cells } else { 0 }, self.lights.len())?;
         let per_row = seen.words_per_row();
         let mut rows = seen.words_mut().chunks_mut(per_row.max(1));
         let mut all = memory::room("cells", cells)?;
@@ -156,23 +148,14 @@ impl<'a> FieldSunJob<'a> {
             values.push(&self.lights, faces.then_some(&all[cell].received));
         }
         drop(all);
-        let suns = self.sunlight.suns.times.len();
-        let mut parts = [suns, lights - suns]
-            .map(|columns| BitMatrix::new(if keeps { values.hours.len() } else { 0 }, columns));
-        if let ([Ok(suns_seen), Ok(sky_seen)], true) = (&mut parts, keeps) {
-            for (row, cell) in self.with_data().enumerate() {
-                for light in ones(seen.row(cell)) {
-                    match light.checked_sub(suns) {
-                        None => suns_seen.set(row, light, true),
-                        Some(patch) => sky_seen.set(row, patch, true),
-                    }
-                }
-            }
-        }
-        let [suns_seen, sky_seen] = parts;
+        let kept: Vec<&[u64]> = match keeps {
+            true => self.with_data().map(|cell| seen.row(cell)).collect(),
+            false => Vec::new(),
+        };
+        let [suns_seen, sky_seen] = self.lights.split(kept.into_iter())?;
         Ok(SunFound {
-            suns_seen: suns_seen?,
-            sky_seen: sky_seen?,
+            suns_seen,
+            sky_seen,
             values,
         })
     }
@@ -197,10 +180,15 @@ impl<'a> FieldSunJob<'a> {
     }
 }
 
-/// Passes cancellation on, and no progress.
-struct Quiet<'a>(&'a dyn Monitor);
+/// Progress of a batch, before which so many of all directions were done.
+struct Batch<'a>(&'a dyn Monitor, [usize; 2]);
 
-impl Monitor for Quiet<'_> {
+impl Monitor for Batch<'_> {
+    fn progress(&self, done: usize, _: usize) {
+        let [before, total] = self.1;
+        self.0.progress(before + done, total);
+    }
+
     fn cancelled(&self) -> bool {
         self.0.cancelled()
     }

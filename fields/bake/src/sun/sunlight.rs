@@ -377,6 +377,26 @@ impl<'a> Lights<'a> {
         self.to_suns.len() + self.sunlight.patches.len()
     }
 
+    /// Rows of bits as a matrix of suns and one of patches.
+    pub fn split<'r>(
+        &self,
+        rows: impl ExactSizeIterator<Item = &'r [u64]>,
+    ) -> Result<[BitMatrix; 2], Error> {
+        let (suns, patches) = (self.to_suns.len(), self.sunlight.patches.len());
+        let mut suns_seen = BitMatrix::new(rows.len(), suns)?;
+        let mut sky_seen = BitMatrix::new(rows.len(), patches)?;
+        for (row, words) in rows.enumerate() {
+            for column in ones(words) {
+                match column.checked_sub(suns) {
+                    None => suns_seen.set(row, column, true),
+                    Some(patch) if patch < patches => sky_seen.set(row, patch, true),
+                    Some(_) => return Err(Error::Answers),
+                }
+            }
+        }
+        Ok([suns_seen, sky_seen])
+    }
+
     /// Adds what a surface with this normal receives from the lights of 64 that it sees; `first` is the number of the lowest bit. If
     /// `has_plane`, it sees none behind its plane. Returns the lights that it sees then.
     pub fn add(
@@ -530,24 +550,6 @@ impl<'a> SunJob<'a> {
         };
         self.places.normals.par_iter().map(above).sum()
     }
-
-    /// Rows of bits as a matrix of suns and one of patches.
-    fn split(&self, words: &[u64]) -> Result<(BitMatrix, BitMatrix), Error> {
-        let (suns, patches) = (self.sunlight.suns.times.len(), self.sunlight.patches.len());
-        let mut suns_seen = BitMatrix::new(self.places.points.len(), suns)?;
-        let mut sky_seen = BitMatrix::new(self.places.points.len(), patches)?;
-        let per_row = (suns + patches).div_ceil(64).max(1);
-        for (row, words) in words.chunks_exact(per_row).enumerate() {
-            for column in ones(words) {
-                match column.checked_sub(suns) {
-                    None => suns_seen.set(row, column, true),
-                    Some(patch) if patch < patches => sky_seen.set(row, patch, true),
-                    Some(_) => return Err(Error::Answers),
-                }
-            }
-        }
-        Ok((suns_seen, sky_seen))
-    }
 }
 
 impl Job for SunJob<'_> {
@@ -578,13 +580,11 @@ impl Job for SunJob<'_> {
     }
 
     fn found(&self, words: Vec<u64>) -> Result<SunFound, Error> {
-        let (suns_seen, sky_seen) = self.split(&words)?;
         let (lights, sensors) = (Lights::new(self.sunlight)?, self.places.points.len());
+        let rows = words.chunks_exact(lights.len().div_ceil(64).max(1));
+        let [suns_seen, sky_seen] = lights.split(rows.clone())?;
         let mut values = SunValues::with_room(sensors, &lights, true)?;
-        for (row, words) in words
-            .chunks_exact(lights.len().div_ceil(64).max(1))
-            .enumerate()
-        {
+        for (row, words) in rows.enumerate() {
             let normal = facing(self.facing.get(row).copied(), &self.sunlight.orientation);
             let received = normal.map(|normal| {
                 let mut received = Received::new(true);

@@ -2,7 +2,7 @@
 
 use antumbra::{Bvh, Recipe};
 use antumbra_bake::{
-    EARTH_RADIUS, HeightField, Key, Limits, Observer, Part, REFRACTION, TargetHeightJob,
+    EARTH_RADIUS, HeightField, Job, Key, Limits, Observer, Part, REFRACTION, TargetHeightJob,
     ViewshedJob, Viewsheds, Work, run,
 };
 use antumbra_raster::{Grid, Raster};
@@ -10,6 +10,21 @@ use antumbra_terrain::Error;
 
 fn tree() -> Bvh {
     Bvh::build(&[], &Recipe::default()).expect("a tree")
+}
+
+/// What so many shares of a job find together.
+fn in_shares<J: Job>(job: &J, shares: u32) -> J::Found {
+    let key = Key::of(job, |_| {});
+    let mut together = Work::new(job, key, [0, 1], Vec::new());
+    for index in 0..shares {
+        let mut work = Work::new(job, key, [index, shares], Vec::new());
+        while work.step(&tree(), &()).expect("a step") {}
+        let mut file = Vec::new();
+        work.write(&mut file).expect("bytes");
+        let part = Part::read(&file).expect("a part");
+        together.add(part).expect("the same job");
+    }
+    together.finish().expect("all")
 }
 
 /// Pseudorandom numbers from 0 to 1.
@@ -369,18 +384,7 @@ fn shares_and_threads_have_the_same_bits() {
     assert_eq!(pool.install(|| case.run(&observers)), whole);
     let field = case.field();
     let job = case.job(&field, &observers);
-    let key = Key::of(&job, |_| {});
-    let mut together = Work::new(&job, key, [0, 1], Vec::new());
-    for index in 0..2 {
-        let mut work = Work::new(&job, key, [index, 2], Vec::new());
-        while work.step(&tree(), &()).expect("a step") {}
-        let mut file = Vec::new();
-        work.write(&mut file).expect("bytes");
-        together
-            .add(Part::read(&file).expect("a part"))
-            .expect("the same job");
-    }
-    assert_eq!(together.finish().expect("all"), whole);
+    assert_eq!(in_shares(&job, 2), whole);
     // One by one, and as a matrix.
     let matrix = whole
         .matrix(&(0..4800).collect::<Vec<_>>())
@@ -412,18 +416,7 @@ fn shares_have_the_least_heights_and_angles_of_all_observers() {
     let job = TargetHeightJob(case.job(&field, &observers));
     let whole = job.heights(&()).expect("heights");
     let bits = |heights: &[f32]| heights.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-    let key = Key::of(&job, |_| {});
-    let mut together = Work::new(&job, key, [0, 1], Vec::new());
-    for index in 0..3 {
-        let mut work = Work::new(&job, key, [index, 3], Vec::new());
-        while work.step(&tree(), &()).expect("a step") {}
-        let mut file = Vec::new();
-        work.write(&mut file).expect("bytes");
-        together
-            .add(Part::read(&file).expect("a part"))
-            .expect("the same job");
-    }
-    assert_eq!(bits(&together.finish().expect("all")), bits(&whole));
+    assert_eq!(bits(&in_shares(&job, 3)), bits(&whole));
     // Cells that nobody sees are those whose least height is above the target, and the others have the least of all angles.
     let sheds = case.run(&observers);
     let angles = case.job(&field, &observers).elevations(&sheds);

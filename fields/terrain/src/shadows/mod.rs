@@ -52,17 +52,21 @@ impl<'a> Shadows<'a> {
     /// The memory is 8 bytes for each cell, and twice as much where edges between cells with data are missing.
     ///
     /// # Errors
-    /// [`Error::NoMemory`].
+    /// [`Error::NoMemory`]; [`Error::Range`] if heights differ by more than 1e30, such as from a mark of missing data that is taken for a
+    /// height.
     pub fn new(field: &'a HeightField<'a>, rise: f64) -> Result<Self, Error> {
         let known = || field.heights().iter().filter(|height| height.is_finite());
         let lowest = known().copied().fold(f64::INFINITY, f64::min);
         let highest = known().copied().fold(f64::NEG_INFINITY, f64::max);
+        let relief = (highest - lowest).max(0.0);
+        let wanted = "at most 1e30; a height that marks missing data is to be named as such, as with gdal_translate -a_nodata";
+        Error::check_range("difference of heights", relief, relief <= 1e30, wanted)?;
         let loose = loose(field);
         let grid = |by_columns| Grid::new(field, lowest, &loose, by_columns);
         Ok(Self {
             field,
             rise,
-            relief: (highest - lowest).max(0.0),
+            relief,
             grids: [grid(false)?, grid(true)?],
         })
     }

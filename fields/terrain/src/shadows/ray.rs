@@ -49,15 +49,12 @@ impl<'a> Ray<'a> {
         }
         let columns = shadows.grids[usize::from(is_turned)].stride as isize;
         let tap = |crossing: &Crossing| {
-            let ends = crossing.ends.map(|[column, row]| {
-                if is_turned {
-                    [row, column]
-                } else {
-                    [column, row]
-                }
-            });
+            let mut ends = crossing.ends;
+            if is_turned {
+                ends.iter_mut().for_each(|end| end.reverse());
+            }
             Tap {
-                offsets: ends.map(|[column, row]| (column + row * columns) as i32),
+                offsets: ends.map(|[column, row]| column + row * columns),
                 column: ends[0][0] as i32,
                 rows: ends[0][1].abs() as i32 + 1,
                 part: crossing.part as f32,
@@ -94,14 +91,15 @@ impl<'a> Ray<'a> {
         let grid = &self.shadows.grids[usize::from(self.is_turned)];
         let is_in = |tap: &Tap| {
             let column = eye.column as isize + tap.column as isize;
-            column >= 2 && column + 2 < grid.columns as isize && tap.rows as usize <= eye.row
+            // Crossings close to each other may be a cell apart.
+            column >= 2 && column + 2 < grid.columns as isize && (tap.rows as usize) < eye.row
         };
         let is_whole = is_in(first) && is_in(last);
         taps.iter().zip(range).any(|(tap, index)| {
             if is_whole {
                 let [a, b] = tap
                     .offsets
-                    .map(|offset| eye.own.wrapping_add_signed(offset as isize));
+                    .map(|offset| eye.own.wrapping_add_signed(offset));
                 let found =
                     grid.heights[a] + tap.part * (grid.heights[b] - grid.heights[a]) - tap.climb;
                 // NaN hides nothing.
@@ -153,7 +151,7 @@ pub struct Eye {
 /// A crossing in single precision.
 struct Tap {
     /// Cells to both ends.
-    offsets: [i32; 2],
+    offsets: [isize; 2],
     /// Columns, and rows ahead, of about the first of them.
     column: i32,
     rows: i32,

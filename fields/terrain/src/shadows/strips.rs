@@ -12,6 +12,9 @@ const BLOCK: usize = 8;
 /// Columns that are taken at once.
 pub const LANES: usize = 16;
 
+/// Parts of a column from a centre of a cell at which a line is on it, more than places are rounded.
+const CLOSE: f64 = 1e-9;
+
 /// A height that hides nothing.
 const NONE: f32 = f32::NEG_INFINITY;
 
@@ -47,8 +50,9 @@ struct Path<'a> {
     rise: f32,
     /// More than keys are rounded.
     slack: f32,
-    /// Crossings of rays just in front of their cells: with edges, and with what is an edge only beside holes.
-    near: [Vec<Tap>; 2],
+    /// Crossings of rays just in front of their cells: with edges, with what is an edge only beside holes, and corners that may be crossed
+    /// instead of what is beside them.
+    near: [Vec<Tap>; 3],
     /// Number of the line at column 0 of the first row.
     first: isize,
 }
@@ -70,19 +74,19 @@ impl<'a> Path<'a> {
         for row in 0..NEAR {
             let place = ray.shift * row as f64;
             let (whole, part) = (place.floor(), place - place.floor());
-            let [mut taps, mut more] = path.taps(part);
+            let [mut taps, more] = path.taps(part);
             if row > 0 {
                 taps.push(Tap::along(part));
             }
-            if row > 0 && (place - place.round()).abs() < 1e-9 {
-                // Where edges are missing, either side of a corner counts.
+            let mut corners = Vec::new();
+            if row > 0 && (place - place.round()).abs() < CLOSE {
                 let column = (place.round() - whole) as isize;
-                more.push(Tap {
+                corners.push(Tap {
                     ends: [(0, column); 2],
                     ..Tap::along(0.0)
                 });
             }
-            for (near, taps) in path.near.iter_mut().zip([taps, more]) {
+            for (near, taps) in path.near.iter_mut().zip([taps, more, corners]) {
                 near.extend(taps.into_iter().map(|tap| {
                     Tap {
                         ends: tap
@@ -138,8 +142,11 @@ impl<'a> Path<'a> {
     /// Number of the line in or behind column 0 of a row, and the part of a column that it is behind.
     fn line(&self, row: usize) -> (usize, f64) {
         let place = -self.ray.shift * row as f64;
-        let whole = place.floor();
-        ((self.first - whole as isize) as usize, place - whole)
+        let (whole, part) = match (place - place.round()).abs() < CLOSE {
+            true => (place.round(), 0.0),
+            false => (place.floor(), place - place.floor()),
+        };
+        ((self.first - whole as isize) as usize, part)
     }
 
     /// Row of the raster.
@@ -300,7 +307,9 @@ impl<'a> Strips<'a> {
         for index in 0..count {
             highest(simd, &own, index, none).store(chunk(lines, LANES * index));
         }
-        for index in 0..count {
+        // Beside a hole a line on a corner may be one that misses it.
+        let is_sure = !path.has_holes || part > 0.0 || path.ray.shift == 0.0;
+        for index in 0..if is_sure { count } else { 0 } {
             let at = LANES * index;
             let (left, right) = (load::<S>(simd, lines, at), load::<S>(simd, lines, at + 1));
             let height = Vector::<S>::load(simd, &middle[index]) + key;
@@ -343,13 +352,22 @@ impl<'a> Strips<'a> {
     fn judge<S: Simd + Width<LANES>>(&mut self, simd: S, row: usize) {
         let Self { path, near, .. } = self;
         let grid = path.grid;
-        let mut crossings = [Vec::new(), Vec::new(), Vec::new()];
-        path.crossings(&grid.heights, row, 0, &path.near[0], &mut crossings[0]);
-        path.crossings(&grid.heights, row, 0, &path.near[1], &mut crossings[1]);
-        if !grid.joined.is_empty() {
-            path.crossings(&grid.joined, row, 0, &path.near[0], &mut crossings[2]);
-        }
-        let [edges, more, joined] = crossings;
+        let all = |heights, taps: &[Tap]| {
+            let mut crossings = Vec::new();
+            path.crossings(heights, row, 0, taps, &mut crossings);
+            crossings
+        };
+        let [edges, more, corners] = &path.near;
+        let joined = match grid.joined.is_empty() {
+            true => Vec::new(),
+            false => all(&grid.joined, edges),
+        };
+        let heights = &grid.heights;
+        let (edges, more, corners) = (
+            all(heights, edges),
+            all(heights, more),
+            all(heights, corners),
+        );
         let (line, _) = path.line(row);
         let key = path.key(row as f64) + path.rise;
         let (none, slack) = (
@@ -368,9 +386,9 @@ impl<'a> Strips<'a> {
                     break;
                 }
                 let edges = highest(simd, &edges, index, none);
-                let (mut near_most, mut near_sure) = (edges, edges);
+                let (mut near_most, mut near_sure) = (highest(simd, &corners, index, edges), edges);
                 if grid.has_gap(own_row, index) {
-                    near_most = highest(simd, &more, index, edges);
+                    near_most = highest(simd, &more, index, near_most);
                     if !grid.joined.is_empty() {
                         near_sure = highest(simd, &joined, index, none);
                     }

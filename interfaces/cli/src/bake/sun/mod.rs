@@ -302,7 +302,8 @@ impl SunArgs {
         let north = self.places.north.degrees();
         let rise = self.places.placement.height / self.places.units.metres();
         let by_month = self.writes(&["csv", "npz"]);
-        let job = FieldSunJob::new(&field, &sunlight, (rise, north), by_month)?;
+        let job = FieldSunJob::new(&field, &sunlight, (rise, north), by_month);
+        let job = job.map_err(|error| Failure::scene(&terrain.name, error))?;
         let mut sensors = terrain.sensors(rise);
         sensors.normals = job.normals();
         let build_seconds = start.elapsed().as_secs_f64();
@@ -325,8 +326,8 @@ impl SunArgs {
         };
         let seconds = [terrain.load_seconds, build_seconds];
         let directions = sunlight.suns.times.len() + sunlight.patches.len();
-        let rays = (directions * sensors.points.len()) as u64;
-        baked.end(bake, (field.triangles(), rays, seconds, begin), &done)
+        let answers = (directions * sensors.points.len()) as u64;
+        baked.end(bake, (field.triangles(), answers, seconds, begin), &done)
     }
 
     /// Computes all of a job with little memory.
@@ -352,11 +353,11 @@ impl SunArgs {
 }
 
 impl<'a> Baked<'a> {
-    /// Writes all files and the document, and says what was done.
+    /// Writes all files and the document, and says what was done: of so many rays, or answers without rays.
     fn end(
         mut self,
         bake: &Bake<'_>,
-        (triangles, rays, [load_seconds, build_seconds], begin): (usize, u64, [f64; 2], Instant),
+        (triangles, number, [load_seconds, build_seconds], begin): (usize, u64, [f64; 2], Instant),
         done: &'a Done<SunFound>,
     ) -> Result<(), Failure> {
         let (sensors, sunlight) = (self.sensors, self.sunlight);
@@ -368,7 +369,8 @@ impl<'a> Baked<'a> {
         }
         let shown = [Shown::Hours, Shown::SkyView, Shown::Direct, Shown::Diffuse];
         let means @ [hours, view, direct, diffuse] = shown.map(|shown| self.value(shown)?.mean());
-        let rays = if done.found.is_some() { rays } else { 0 };
+        let number = if done.found.is_some() { number } else { 0 };
+        let rays = if self.terrain.is_some() { 0 } else { number };
         let (suns, place) = (&sunlight.suns, &self.when.place);
         let total = begin.elapsed().as_secs_f64();
         let figures: &[Figure<'_>] = &[
@@ -404,7 +406,12 @@ impl<'a> Baked<'a> {
                 (None, None) => {}
             }
             self.tell(found, means);
-            bake.end("rays", rays, done);
+            let things = if self.terrain.is_some() {
+                "answers"
+            } else {
+                "rays"
+            };
+            bake.end(things, number, done);
         }
         Ok(())
     }
