@@ -31,6 +31,7 @@
 //! | how high must something on a cell be until an observer sees it | [`TargetHeightJob`], [`run`] | a number for each cell |
 //! | how high is the horizon in each azimuth | [`HorizonJob`], [`run`] | `f32`, points x azimuths |
 //! | how high is the horizon of each cell of a height raster | [`FieldHorizonJob`], [`run`] | `f32`, directions x cells |
+//! | how much of the sky does each cell see | [`FieldSky`] | [`SkyValues`] |
 //! | which points see each other | [`sees_points`], [`sees_each_other`] | [`BitMatrix`], points x points |
 //!
 //! All of them take slices of `[f32; 3]` in the coordinates of the tree, and a [`Monitor`], which receives the progress and may
@@ -79,7 +80,8 @@
 //!   bit per answer;  `directions`: directions over a hemisphere;  `curvature`: lines of sight over a round earth
 //! - `sun`: `position`: where the sun is;  `sky`, `perez`: the sky in patches, and its light;  `moment`, `clock`, `epw`: dates, time
 //!   zones, weather files;  `sunlight`: the job of a period;  `exposure`, `hourly`, `measures`: sums, steps and classes
-//! - `rasters`: `viewshed`, `field_horizon`, `field_sun`: jobs of height rasters, which `antumbra-terrain` answers without rays
+//! - `rasters`: `viewshed`, `field_horizon`, `field_sun`: jobs of height rasters, which `antumbra-terrain` answers without rays;
+//!   `field_sky`: the sky that horizons leave open
 //! - `files`: `npz`: arrays for numpy;  `ply`, `glb`: meshes with a value at every vertex
 //! - `vector`, `orientation`: vectors, and where up and north are in a scene
 //! - `error`: why there is no result

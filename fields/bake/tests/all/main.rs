@@ -4,6 +4,7 @@
 //! - `visibility`: what points see, against brute force
 //! - `viewshed`, `height_fields`: terrain, against all triangles in double precision
 //! - `field_sun`: sun and sky of terrain, against rays
+//! - `sky`: how much of it cells see, against closed forms and sums over elevations
 //! - `promises`: equal bits, errors, cancellation
 
 mod closed_forms;
@@ -11,5 +12,6 @@ mod field_sun;
 mod height_fields;
 mod promises;
 mod reference;
+mod sky;
 mod viewshed;
 mod visibility;

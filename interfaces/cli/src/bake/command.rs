@@ -190,12 +190,12 @@ impl<T> Done<T> {
     }
 
     /// What `of` makes of the result.
-    pub fn map<U>(self, of: impl FnOnce(T) -> U) -> Done<U> {
-        Done {
-            found: self.found.map(of),
+    pub fn map<U>(self, of: impl FnOnce(T) -> Result<U, Error>) -> Result<Done<U>, Failure> {
+        Ok(Done {
+            found: self.found.map(of).transpose()?,
             seconds: self.seconds,
             checkpoint: self.checkpoint,
-        }
+        })
     }
 }
 

@@ -1,4 +1,4 @@
-//! `antumbra horizon`: how high surfaces reach in each direction of the compass.
+//! `antumbra horizon`: how high surfaces reach in each direction of the compass, and how much sky they leave open.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -6,12 +6,13 @@ use std::time::Instant;
 
 use antumbra::LocalOrigin;
 use antumbra_bake::{
-    Array, Direction, Entry, FieldHorizonJob, HorizonJob, Lattice, Monitor, Orientation, Sensors,
+    Array, Direction, Entry, FieldHorizonJob, FieldSky, HeightField, HorizonJob, Lattice, Monitor,
+    Orientation, Sensors, SkyMeasure, SkyValues,
 };
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_raster::{Grid, Quantity};
-use clap::{ArgGroup, Args};
+use clap::{ArgGroup, Args, ValueEnum};
 
 use super::command::{Bake, Baking, Done, Figure, Named};
 use super::files::{self, Column, Format};
@@ -21,16 +22,47 @@ use super::site::Asked;
 use super::terrain::is_terrain;
 use crate::args::{ChunkArgs, PlaceArgs, RasterArgs, SCENE, heading, rasters_long, values};
 use crate::exit::{Failure, tell};
+use crate::input::check_answers;
 use crate::interrupt;
 use crate::json::Destination;
 use crate::output::{Files, check_room, is_one_of};
 use crate::progress::Progress;
 
-/// Name and unit of rasters.
-const QUANTITY: Quantity<'static> = Quantity {
-    name: "horizon",
-    unit: "degrees",
-};
+/// What is written of horizons.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Shown {
+    /// Elevation of the horizon in each azimuth, in degrees
+    Angles,
+    /// Part of the light of an even sky that the surface of a cell receives
+    SkyView,
+    /// Part of the hemisphere above that is not hidden, by solid angle
+    SkyOpen,
+    /// Degrees from the zenith to the horizon, on average
+    Openness,
+}
+
+impl Shown {
+    /// What is measured, but for angles.
+    fn measure(self) -> Option<SkyMeasure> {
+        match self {
+            Self::Angles => None,
+            Self::SkyView => Some(SkyMeasure::View),
+            Self::SkyOpen => Some(SkyMeasure::Open),
+            Self::Openness => Some(SkyMeasure::Openness),
+        }
+    }
+
+    /// Name and unit in files.
+    fn quantity(self) -> Quantity<'static> {
+        let (name, unit) = match self {
+            Self::Angles => ("horizon", "degrees"),
+            Self::SkyView => ("sky_view", ""),
+            Self::SkyOpen => ("sky_open", ""),
+            Self::Openness => ("openness", "degrees"),
+        };
+        Quantity { name, unit }
+    }
+}
 
 /// Flags of `horizon`.
 #[derive(Debug, Args)]
@@ -42,9 +74,16 @@ pub struct HorizonArgs {
     ///
     /// May be given several times. A .csv has a line per sensor and a column per azimuth, such as horizon_090. An .npz has the
     /// array horizon, sensors x azimuths, with azimuths and points. A .tif (GeoTIFF), .asc or .npy has one azimuth (--azimuths 1) in
-    /// the cells of a --grid or of a scene that is a raster. A shard is a .part.
+    /// the cells of a --grid or of a scene that is a raster, or the value of --show. A shard is a .part.
     #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
+    /// What to write: angles, or the sky that they leave open
+    ///
+    /// All but angles are for --cells of a height raster, and one number for each cell: a sum over its horizons, which stand for the parts
+    /// of the circle around them. The sky ends at the horizontal. The end of the run says how much values would change with half
+    /// of the azimuths, which bounds their error from above in practice.
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = Shown::Angles, help_heading = heading::OUTPUT)]
+    pub show: Shown,
     #[command(flatten)]
     pub raster: RasterArgs,
     /// Figures as JSON; - is the standard output
@@ -128,7 +167,7 @@ impl Baking for HorizonArgs {
                 continue;
             }
             places::check_raster(path, &self.places, &self.scene)?;
-            let is_one = self.azimuths() == Azimuths::Even(1);
+            let is_one = self.azimuths() == Azimuths::Even(1) || self.show != Shown::Angles;
             if !(is_one || self.places.vertices && has_planes(path)) {
                 let reason = "a raster has one azimuth: --azimuths 1 with --first; .npz and .npy of cells have all";
                 return Err(Failure::name(path, reason));
@@ -136,6 +175,12 @@ impl Baking for HorizonArgs {
         }
         if !self.is_of_cells() {
             self.even()?;
+            if self.show != Shown::Angles {
+                let name = self.show.quantity().name.replace('_', "-");
+                return Err(Failure::Usage(format!(
+                    "--show {name} is for --cells of a height raster; of other scenes, sun has the sky view of sensors and ao that of vertices"
+                )));
+            }
         } else if self.first != 0.0 && self.even().is_err() {
             let reason =
                 "--first is for azimuths that are evenly spread, and a lattice has its own";
@@ -162,6 +207,7 @@ impl Baking for HorizonArgs {
         let job = HorizonJob::new(&sensors.points, &sensors.normals, &azimuths, &compass)?;
         let horizon = Horizon {
             name: &ground.loaded.scene.name,
+            show: Shown::Angles,
             azimuths: &azimuths,
             number: sensors.points.len(),
             triangles: ground.mesh.indices.len(),
@@ -169,11 +215,13 @@ impl Baking for HorizonArgs {
         };
         let done = bake.compute(&job, &ground, &ground.bvh)?;
         let place = (self.raster.crs.as_ref(), self.places.units.metres());
-        horizon.write(bake, (sensors, ground.local, &done), |path, angles| {
-            raster::write(path, &ground, (sensors, angles), place, (up, QUANTITY))
+        let rows = (sensors, ground.local, done.found.as_deref());
+        horizon.write(bake, rows, |path, angles| {
+            let quantity = Shown::Angles.quantity();
+            raster::write(path, &ground, (sensors, angles), place, (up, quantity))
         })?;
         let all = Sum::of(done.found.as_deref());
-        horizon.end(bake, all, &done, || ground.tell(""))
+        horizon.end(bake, (all, None), &done, || ground.tell(""))
     }
 }
 
@@ -208,31 +256,38 @@ fn of_cells(args: &HorizonArgs, bake: &Bake<'_>, mut files: Files) -> Result<(),
     let job = FieldHorizonJob::new(&field, &directions, rise, 0.0)?;
     let horizon = Horizon {
         name: &terrain.name,
+        show: args.show,
         azimuths: &azimuths,
         number: terrain.cells().count(),
         triangles: field.triangles(),
         seconds: [terrain.load_seconds, start.elapsed().as_secs_f64()],
     };
-    if let ([path], true) = (bake.outputs, bake.is_whole())
+    if let ([path], true, Shown::Angles) = (bake.outputs, bake.is_whole(), args.show)
         && has_planes(path)
     {
         return horizon.write_planes(bake, path, &grid, &job);
     }
-    let mut done = bake.compute_cells(&job, &terrain.name)?;
-    let planes = done.found.take();
-    // Of cells with data, all azimuths of one after the other.
-    let of_cell = |planes: &Vec<f32>| {
-        let angles =
-            |cell: usize| (0..azimuths.len()).map(move |at| planes[at * values.len() + cell]);
-        terrain.cells().flat_map(angles).collect()
+    let (done, quadrature_error) = match args.show.measure() {
+        None => (bake.compute_cells(&job, &terrain.name)?, None),
+        Some(measure) => {
+            let found = horizon.sky(bake, (&field, &directions, measure), &job)?;
+            let quadrature_error = found.found.as_ref().and_then(|sky| sky.quadrature_error);
+            (found.map(|sky| Ok(sky.values))?, quadrature_error)
+        }
     };
-    done.found = planes.as_ref().map(of_cell);
+    let planes = done.found.as_deref().unwrap_or_default();
+    // Of cells with data, all values of one after the other.
+    let width = horizon.width();
+    let of_cell = |cell: usize| (0..width).map(move |at| planes[at * values.len() + cell]);
+    let is_known = done.found.is_some();
+    let found: Option<Vec<f32>> = is_known.then(|| terrain.cells().flat_map(of_cell).collect());
+    let all = Sum::of(found.as_deref());
     let sensors = terrain.sensors(0.0);
-    horizon.write(bake, (&sensors, terrain.local(), &done), |path, _| {
-        let planes = planes.as_deref().unwrap_or_default();
-        raster::write_values(path, &grid, planes, QUANTITY)
+    let rows = (&sensors, terrain.local(), found.as_deref());
+    horizon.write(bake, rows, |path, _| {
+        raster::write_values(path, &grid, planes, args.show.quantity())
     })?;
-    horizon.end(bake, Sum::of(done.found.as_deref()), &done, || ())
+    horizon.end(bake, (all, quadrature_error), &done, || ())
 }
 
 /// Whether a file has all azimuths as planes of cells.
@@ -244,6 +299,7 @@ fn has_planes(path: &Path) -> bool {
 struct Horizon<'a> {
     /// Name of the scene.
     name: &'a str,
+    show: Shown,
     azimuths: &'a [f64],
     /// Number of sensors.
     number: usize,
@@ -294,47 +350,85 @@ impl Horizon<'_> {
         failure.map_or(Ok(()), |error| Err(Failure::from(error)))?;
         written?;
         let done = Done::whole((), start.elapsed().as_secs_f64());
-        self.end(bake, all, &done, || ())
+        self.end(bake, (all, None), &done, || ())
     }
 
-    /// Writes all outputs of angles; `raster` those that are rasters.
+    /// Sums the sky that the horizons of a field leave open: plane by plane, or from the planes of shards.
+    fn sky(
+        &self,
+        bake: &Bake<'_>,
+        (field, directions, measure): (&HeightField<'_>, &[Direction], SkyMeasure),
+        job: &FieldHorizonJob<'_>,
+    ) -> Result<Done<SkyValues>, Failure> {
+        let sums = || FieldSky::new(field, directions, measure);
+        if !bake.is_whole() {
+            return bake.compute_cells(job, self.name)?.map(|planes| {
+                let mut sky = sums()?;
+                let planes = planes.chunks_exact(field.heights().len()).enumerate();
+                planes.for_each(|(index, plane)| sky.add(index, plane));
+                Ok(sky.finish())
+            });
+        }
+        let (start, count) = (Instant::now(), directions.len());
+        check_answers(self.name, FieldSky::memory(field))?;
+        let progress = Progress::new(self.name);
+        let mut sky = sums()?;
+        for index in 0..count {
+            sky.add(
+                index,
+                &job.plane(index, &Planes(&progress, [index, count]))?,
+            );
+        }
+        progress.finish();
+        Ok(Done::whole(sky.finish(), start.elapsed().as_secs_f64()))
+    }
+
+    /// Number of values of each sensor.
+    fn width(&self) -> usize {
+        match self.show {
+            Shown::Angles => self.azimuths.len(),
+            _ => 1,
+        }
+    }
+
+    /// Writes all outputs of values, which are `None` for a shard; `raster` those that are rasters.
     fn write(
         &self,
         bake: &Bake<'_>,
-        (sensors, local, done): (&Sensors, LocalOrigin, &Done<Vec<f32>>),
+        (sensors, local, values): (&Sensors, LocalOrigin, Option<&[f32]>),
         raster: impl Fn(&Path, &[f32]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let Some(angles) = &done.found else {
+        let Some(values) = values else {
             return Ok(());
         };
         let _writing = interrupt::writing();
-        let width = self.azimuths.len();
+        let (Quantity { name, unit }, width) = (self.show.quantity(), self.width());
         bake.outputs
             .iter()
             .try_for_each(|path| match Format::of_sensors(path)? {
                 Format::Csv => {
-                    let column = |(at, azimuth): (usize, &f64)| {
-                        // Whole degrees are the rule, and their names sort.
-                        let name = match azimuth.fract() == 0.0 {
-                            true => format!("horizon_{azimuth:03}"),
-                            false => format!("horizon_{azimuth:06.2}"),
-                        };
-                        let angle = move |row: usize| f64::from(angles[row * width + at]);
-                        Column::new(name, move |row| (angle(row) * 1e4).round() / 1e4)
+                    let names: Vec<String> = match self.show {
+                        Shown::Angles => self.azimuths.iter().map(column_name).collect(),
+                        _ => vec![name.to_owned()],
+                    };
+                    let steps = if unit.is_empty() { 1e6 } else { 1e4 };
+                    let column = |(at, name)| {
+                        let value = move |row: usize| f64::from(values[row * width + at]);
+                        Column::new(name, move |row| (value(row) * steps).round() / steps)
                     };
                     let columns: Vec<Column<'_>> =
-                        self.azimuths.iter().enumerate().map(column).collect();
+                        names.into_iter().enumerate().map(column).collect();
                     files::table(path, (sensors, &sensors.normals, local), &[], &columns)
                 }
                 Format::Npz => {
                     let entries = [
-                        Entry::new("horizon", Array::F32(angles)).columns(width),
+                        Entry::new(name, Array::F32(values)).columns(width),
                         Entry::new("azimuths", Array::F64(self.azimuths)),
                         Entry::new("points", Array::Places(&sensors.points, local)),
                     ];
                     files::npz(path, &entries)
                 }
-                _ => raster(path, angles),
+                _ => raster(path, values),
             })
     }
 
@@ -342,34 +436,68 @@ impl Horizon<'_> {
     fn end<T>(
         &self,
         bake: &Bake<'_>,
-        Sum(sum, number): Sum,
+        (Sum(sum, number), quadrature_error): (Sum, Option<[f64; 2]>),
         done: &Done<T>,
         tell_scene: impl Fn(),
     ) -> Result<(), Failure> {
         let mean = (number > 0).then(|| sum / number as f64);
-        let figures: &[Figure<'_>] = &[
-            ("outputs", &bake.output_names()),
-            ("shard", &bake.shard()),
+        let Quantity { name, unit } = self.show.quantity();
+        let (is_angles, outputs) = (self.show == Shown::Angles, bake.output_names());
+        let (shard, planes) = (bake.shard(), self.azimuths.len());
+        let mut figures: Vec<Figure<'_>> = vec![
+            ("outputs", &outputs),
+            ("shard", &shard),
             ("triangles", &self.triangles),
             ("sensors", &self.number),
             ("azimuths", &self.azimuths),
-            ("mean_degrees", &mean),
-            ("load_seconds", &self.seconds[0]),
+        ];
+        match is_angles {
+            true => figures.push(("mean_degrees", &mean)),
+            false => figures.extend([
+                ("show", &name as &dyn erased_serde::Serialize),
+                ("mean", &mean),
+                ("quadrature_error", &quadrature_error),
+            ]),
+        }
+        figures.extend([
+            (
+                "load_seconds",
+                &self.seconds[0] as &dyn erased_serde::Serialize,
+            ),
             ("build_seconds", &self.seconds[1]),
             ("trace_seconds", &done.seconds),
-        ];
-        let name = ("antumbra.horizon/1", self.name);
-        if bake.document(name, figures, (done, ""))? {
+        ]);
+        if bake.document(("antumbra.horizon/1", self.name), &figures, (done, ""))? {
             tell_scene();
-            tell(format_args!(
-                "{} sensors, {} azimuths; the horizon is {:.2} degrees high on average",
-                count(self.number as u64),
-                self.azimuths.len(),
-                mean.unwrap_or(f64::NAN),
-            ));
-            bake.end("angles", (self.number * self.azimuths.len()) as u64, done);
+            let (sensors, mean) = (count(self.number as u64), mean.unwrap_or(f64::NAN));
+            if is_angles {
+                tell(format_args!(
+                    "{sensors} sensors, {planes} azimuths; the horizon is {mean:.2} degrees high on average"
+                ));
+            } else {
+                let gap = if unit.is_empty() { "" } else { " " };
+                let name = name.replace('_', " ");
+                tell(format_args!(
+                    "{sensors} cells, {planes} azimuths; {name} is {mean:.4}{gap}{unit} on average"
+                ));
+            }
+            if let Some([mean, most]) = quadrature_error {
+                tell(format_args!(
+                    "with half of the azimuths values differ by {mean:.4} on average and {most:.4} at most; --azimuths lattice:N has more",
+                ));
+            }
+            bake.end("angles", (self.number * planes) as u64, done);
         }
         Ok(())
+    }
+}
+
+/// Name of the column of an azimuth.
+fn column_name(azimuth: &f64) -> String {
+    // Whole degrees are the rule, and their names sort.
+    match azimuth.fract() == 0.0 {
+        true => format!("horizon_{azimuth:03}"),
+        false => format!("horizon_{azimuth:06.2}"),
     }
 }
 

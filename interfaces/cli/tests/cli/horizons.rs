@@ -118,3 +118,57 @@ fn horizons_by_rays_and_of_cells_agree_and_shares_change_no_byte() {
     ];
     place.run(&one).expect(0);
 }
+
+#[test]
+fn cells_have_the_sky_that_their_horizons_leave() {
+    let place = Place::empty();
+    // A step of 3 m from the west to the east.
+    let row = "0 0 0 0 0 3 3 3 3 3\n";
+    let asc = "ncols 10\nnrows 401\nxllcorner 600000\nyllcorner 5340000\ncellsize 1\n";
+    place.write("step.asc", format!("{asc}{}", row.repeat(401)));
+    let flags = ["horizon", "step.asc", "--cells", "--show", "sky-view"];
+    let outputs = ["-o", "sky.csv", "-o", "sky.npy", "-o", "sky.npz"];
+    let said = place.run(&[&flags[..], &outputs].concat()).expect(0).stderr;
+    assert!(
+        said.contains("4 010 cells, 16 azimuths; sky view is 0."),
+        "{said}"
+    );
+    assert!(
+        said.contains("with half of the azimuths values differ by 0.0"),
+        "{said}"
+    );
+    let rows = place.rows("sky.csv");
+    assert_eq!(rows[0].join(","), "x,y,z,sky_view");
+    // A wall without an end leaves (1 + cos a) / 2 of the light of the sky, if it ends at the elevation a.
+    for column in 0..4 {
+        let tangent = 3.0 / f64::from(5 - column);
+        let wanted = 0.5 * (1.0 + 1.0 / tangent.hypot(1.0));
+        let found: f64 = rows[1 + 2000 + column as usize][3]
+            .parse()
+            .expect("a number");
+        assert!(
+            (found - wanted).abs() < 0.01,
+            "{column}: {found} for {wanted}"
+        );
+    }
+    let planes = fs::read(place.path("sky.npy")).expect("a plane");
+    assert!(String::from_utf8_lossy(&planes[..128]).contains("(401, 10)"));
+    for share in ["0/2", "1/2"] {
+        let part = format!("{}.part", &share[..1]);
+        let flags = [&flags[..], &["--shard", share, "-o", &part]].concat();
+        place.run(&flags).expect(0);
+    }
+    place
+        .run(&["merge", "0.part", "1.part", "-o", "merged.npz"])
+        .expect(0);
+    let read = |name: &str| fs::read(place.path(name)).expect("a file");
+    assert!(read("merged.npz") == read("sky.npz"));
+    let grid = [
+        "horizon", "step.asc", "--grid", "2", "--show", "openness", "-o", "b.csv",
+    ];
+    let said = place.run(&grid).expect(2).stderr;
+    assert!(
+        said.contains("--show openness is for --cells of a height raster"),
+        "{said}"
+    );
+}

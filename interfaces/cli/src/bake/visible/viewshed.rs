@@ -87,8 +87,8 @@ pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), 
                 _ => counts(&found, heights),
             };
             seen = Some(found);
-            values
-        }),
+            Ok(values)
+        })?,
     };
     if let Some(values) = &done.found {
         write(args, &terrain, &table, values, seen.as_ref())?;
