@@ -21,6 +21,15 @@ pub fn sin_cos_degrees(angle: f64) -> (f64, f64) {
     }
 }
 
+/// Slope of an elevation in degrees, its tangent: infinite at the zenith, and NaN for what is no elevation from -90 to 90.
+pub fn slope(elevation: f64) -> f64 {
+    let (sin, cos) = sin_cos_degrees(elevation);
+    match elevation.abs() <= 90.0 {
+        true => sin / cos,
+        false => f64::NAN,
+    }
+}
+
 /// Elevation in degrees of a slope, rounded to single precision: -90 and 90 for infinite ones.
 ///
 /// Without branches, so that compilers make vectors of it; with the same bits everywhere, as it is only sums, products and a quotient.
@@ -74,5 +83,15 @@ mod tests {
         let exact = [0.0, 1.0, -1.0, f64::INFINITY, f64::NEG_INFINITY].map(degrees);
         assert_eq!(exact, [0.0, 45.0, -45.0, 90.0, -90.0]);
         assert!(degrees(f64::NAN).is_nan());
+        assert_eq!(
+            [-90.0, 0.0, 90.0].map(slope),
+            [f64::NEG_INFINITY, 0.0, f64::INFINITY]
+        );
+        assert!(
+            [90.1, -91.0, f64::NAN]
+                .map(slope)
+                .iter()
+                .all(|slope| slope.is_nan())
+        );
     }
 }

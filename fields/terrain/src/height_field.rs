@@ -38,6 +38,12 @@ impl Observer {
         let [x, y] = self.place;
         [x, y, self.height].iter().all(|x| x.is_finite())
     }
+
+    /// The same observer, but so much higher.
+    pub fn raised(self, by: f64) -> Self {
+        let height = self.height + by;
+        Self { height, ..self }
+    }
 }
 
 /// Two cells that are neighbours in a row or a column, the first one first: an edge of no triangle.
@@ -196,6 +202,21 @@ impl<'a> HeightField<'a> {
         ];
         let length = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
         (count > 0.0).then(|| normal.map(|x| x / length))
+    }
+
+    /// A free eye at a point of the map, or on the surface if its height is NaN; `None` beside the surface then.
+    pub fn observer(&self, [x, y, z]: [f64; 3]) -> Option<Observer> {
+        let place = self.place([x, y]);
+        let ground = if z.is_nan() {
+            self.surface(place)
+        } else {
+            Some(z)
+        };
+        Some(Observer {
+            place,
+            height: ground?,
+            normal: [0.0; 3],
+        })
     }
 
     /// Whether the eye of an observer is below the surface.

@@ -60,7 +60,7 @@ pub use lattice::{Direction, Lattice};
 pub use march::March;
 pub use monitor::Monitor;
 #[doc(hidden)]
-pub use monitor::Progress;
+pub use monitor::{Progress, Share};
 pub use shadows::{Shadows, per_cell};
 pub use sweep::Sweep;
 pub use viewshed::{Limits, Viewer};

@@ -39,3 +39,18 @@ impl<'a> Progress<'a> {
         self.monitor.progress(before + items, self.of);
     }
 }
+
+/// Watches a share of work, of so many that count alike.
+pub struct Share<'a>(pub &'a dyn Monitor, pub [usize; 2]);
+
+impl Monitor for Share<'_> {
+    fn progress(&self, done: usize, total: usize) {
+        let Self(monitor, [index, parts]) = self;
+        let part = 1000 * done / total.max(1);
+        monitor.progress(1000 * index + part, 1000 * parts);
+    }
+
+    fn cancelled(&self) -> bool {
+        self.0.cancelled()
+    }
+}

@@ -6,12 +6,13 @@ use std::time::Instant;
 
 use antumbra::LocalOrigin;
 use antumbra_bake::{
-    Array, Direction, Entry, FieldHorizonJob, FieldSky, HeightField, HorizonJob, Lattice, Monitor,
+    Array, Direction, Entry, FieldHorizonJob, FieldSky, HeightField, HorizonJob, Lattice,
     Orientation, Sensors, SkyMeasure, SkyValues,
 };
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_raster::{Grid, Quantity};
+use antumbra_terrain::Share;
 use clap::{ArgGroup, Args, ValueEnum};
 
 use super::command::{Bake, Baking, Done, Figure, Named};
@@ -336,7 +337,7 @@ impl Horizon<'_> {
         let (mut all, mut failure) = (Sum::default(), None);
         let written = atomic_write(path, |file| {
             antumbra_raster::write_planes(file, grid, planes, &mut |index| {
-                let plane = job.plane(index, &Planes(&progress, [index, planes]));
+                let plane = job.plane(index, &Share(&progress, [index, planes]));
                 let plane = plane.map_err(|error| {
                     failure = Some(error);
                     io::Error::other("cancelled")
@@ -376,7 +377,7 @@ impl Horizon<'_> {
         for index in 0..count {
             sky.add(
                 index,
-                &job.plane(index, &Planes(&progress, [index, count]))?,
+                &job.plane(index, &Share(&progress, [index, count]))?,
             );
         }
         progress.finish();
@@ -498,21 +499,5 @@ fn column_name(azimuth: &f64) -> String {
     match azimuth.fract() == 0.0 {
         true => format!("horizon_{azimuth:03}"),
         false => format!("horizon_{azimuth:06.2}"),
-    }
-}
-
-/// Progress of one of so many planes.
-struct Planes<'a>(&'a Progress, [usize; 2]);
-
-impl Monitor for Planes<'_> {
-    fn progress(&self, done: usize, total: usize) {
-        // Planes differ in what they count.
-        let Self(progress, [index, planes]) = self;
-        let part = 1000 * done / total.max(1);
-        Monitor::progress(*progress, 1000 * index + part, 1000 * planes);
-    }
-
-    fn cancelled(&self) -> bool {
-        Monitor::cancelled(self.0)
     }
 }

@@ -162,20 +162,15 @@ impl Table {
         }
         let mut observers = Vec::with_capacity(points.len());
         for (index, point) in points.iter_mut().enumerate() {
-            let place = field.place([point[0], point[1]]);
-            if point[2].is_nan() {
-                let off = || antumbra_bake::Error::OffSurface { index };
-                let height = field.surface(place).ok_or_else(off);
-                point[2] = height.map_err(|error| Failure::Data(format!("{name}: {error}")))?;
+            let off = || antumbra_bake::Error::OffSurface { index };
+            let observer = field.observer(*point).ok_or_else(off);
+            let mut observer =
+                observer.map_err(|error| Failure::Data(format!("{name}: {error}")))?;
+            point[2] = observer.height;
+            if let Some(normal) = sensors.normals.get(index) {
+                observer.normal = normal.map(f64::from);
             }
-            observers.push(Observer {
-                place,
-                height: point[2] + args.eye,
-                normal: sensors
-                    .normals
-                    .get(index)
-                    .map_or([0.0; 3], |normal| normal.map(f64::from)),
-            });
+            observers.push(observer.raised(args.eye));
         }
         let ends = [terrain.extent.low, terrain.extent.high].map(|corner| corner.to_array());
         super::warn_of_far(path, points.iter().copied(), ("raster", ends));
