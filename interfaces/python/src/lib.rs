@@ -4,7 +4,7 @@
 //!
 //! - `arrays`: arguments that are arrays;  `call`: threads, Ctrl-C and progress;  `errors`: exceptions
 //! - `scene`: a tree with everything that made it
-//! - `rays`: rays and what they hit;  `points`: questions about points;  `bakes`: jobs about many points
+//! - `rays`: rays and what they hit;  `points`: questions about points;  `bakes`: jobs about many points;  `terrain`: height fields
 //! - `methods`: the classes `Queries`, `Scene` and `World`
 //! - `pictures`: the classes `Picture` and `Map`;  `html`: what notebooks show
 
@@ -18,6 +18,7 @@ mod pictures;
 mod points;
 mod rays;
 mod scene;
+mod terrain;
 
 use pyo3::create_exception;
 use pyo3::exceptions::PyUserWarning;
@@ -37,7 +38,7 @@ mod _core {
     #[pymodule_export]
     use super::bakes::bits::BitMatrix;
     #[pymodule_export]
-    use super::bakes::{sensors::texel_atlas, sky::sky_patches, sun::sun_positions};
+    use super::bakes::{sensors::texel_atlas, sky::sky_patches, sun::sun_positions, sun::suns};
     #[pymodule_export]
     use super::call::threads::{get_threads, set_threads};
     #[pymodule_export]
@@ -54,6 +55,8 @@ mod _core {
     use super::points::Closest;
     #[pymodule_export]
     use super::rays::hits::{HitList, Hits};
+    #[pymodule_export]
+    use super::terrain::Field;
     #[pymodule_export]
     #[allow(non_upper_case_globals)]
     const __version__: &str = env!("CARGO_PKG_VERSION");

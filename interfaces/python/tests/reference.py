@@ -9,15 +9,22 @@ import antumbra.embreex
 import antumbra.open3d
 import antumbra.trimesh
 
+try:
+    import antumbra.xarray
+except ImportError:
+    print("no xarray: the reference is without antumbra.xarray")
+
 PAGE = pathlib.Path(__file__).parents[3] / "docs" / "src" / "python" / "reference.md"
 
 PARTS = [
     ("Scenes", antumbra, ["Scene", "World", "Queries", "Mesh", "Curves", "Instance", "Assembly", "ChildOrder"]),
-    ("Results", antumbra, ["Hits", "HitList", "Closest", "Occluders", "BitMatrix", "SunPositions", "Irradiation", "Map", "Picture"]),
+    ("Height fields", antumbra, ["HeightField"]),
+    ("Results", antumbra, ["Hits", "HitList", "Closest", "Occluders", "BitMatrix", "SunPositions", "Irradiation", "Horizons", "Map", "Picture"]),
     ("Functions", antumbra, ["sun_positions", "irradiation", "sky_patches", "texel_atlas", "heat_map", "render", "set_threads", "get_threads"]),
     ("Warnings", antumbra, ["DegenerateWarning"]),
     ("antumbra.trimesh", antumbra.trimesh, ["RayMeshIntersector", "install"]),
     ("antumbra.open3d", antumbra.open3d, ["RaycastingScene"]),
+    *([("antumbra.xarray", antumbra.xarray, ["Terrain"])] if hasattr(antumbra, "xarray") else []),
     ("antumbra.embreex", antumbra.embreex, ["install"]),
     ("antumbra.embreex.rtcore_scene", antumbra.embreex.rtcore_scene, ["EmbreeScene"]),
     ("antumbra.embreex.mesh_construction", antumbra.embreex.mesh_construction, ["TriangleMesh", "ElementMesh"]),
@@ -80,7 +87,7 @@ def text():
             out.append(body(module) + "\n")
         for name in names:
             thing = getattr(module, name)
-            out.append(f"### `{name}{signature(thing) if not inspect.isclass(thing) or name in ('Scene', 'World') else ''}`\n")
+            out.append(f"### `{name}{signature(thing) if not inspect.isclass(thing) or name in ('Scene', 'World', 'HeightField') else ''}`\n")
             out.append(body(thing) + "\n")
             if inspect.isclass(thing) and not issubclass(thing, Warning):
                 for member, of in sorted(members(thing)):

@@ -34,6 +34,7 @@ from ._core import (
     texel_atlas,
 )
 from ._sun import Irradiation, SunPositions, irradiation, sun_positions
+from ._terrain import HeightField, Horizons
 
 
 class Mesh(NamedTuple):
@@ -179,8 +180,10 @@ __all__ = [
     "Closest",
     "Curves",
     "DegenerateWarning",
+    "HeightField",
     "HitList",
     "Hits",
+    "Horizons",
     "Instance",
     "Irradiation",
     "Map",

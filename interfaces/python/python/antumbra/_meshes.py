@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ._labelled import plan, real
+
 Pair = tuple[Any, Any]
 """Vertices and faces."""
 
@@ -181,7 +183,7 @@ def grid(heights: Any, transform: Any) -> tuple[NDArray[np.float64], NDArray[np.
     if hasattr(heights, "coords") and hasattr(heights, "dims"):
         z, x, y = _labelled(heights, transform)
     else:
-        z = _real(heights)
+        z = real(heights)
         if z.ndim != 2:
             raise ValueError(f"heights: found shape {z.shape}, wanted (rows, columns)")
         rows, columns = np.arange(float(z.shape[0])), np.arange(float(z.shape[1]))
@@ -190,34 +192,17 @@ def grid(heights: Any, transform: Any) -> tuple[NDArray[np.float64], NDArray[np.
     return vertices, _cells(vertices.reshape(*z.shape, 3))
 
 
-def _real(heights: Any) -> NDArray[np.float64]:
-    """Heights in double precision; what is masked is a hole."""
-    if isinstance(heights, np.ma.MaskedArray):
-        heights = np.where(np.ma.getmaskarray(heights), np.nan, np.ma.getdata(heights))
-    if not hasattr(heights, "__array__") and hasattr(heights, "__dlpack__"):
-        heights = np.from_dlpack(heights)
-    array = np.asarray(heights)
-    if array.dtype.kind not in "fiu":
-        raise TypeError(f"heights: found dtype {array.dtype}, wanted real numbers")
-    return array.astype(np.float64)
-
-
 def _labelled(heights: Any, transform: Any) -> tuple[NDArray[np.float64], ...]:
     """Heights of an xarray.DataArray, and the coordinates x and y of its columns and rows."""
     if transform is not None:
         raise ValueError("transform: found one beside a DataArray, whose coordinates x and y say where it is; wanted None")
-    names = tuple(heights.dims)
-    for name in names:
-        if name not in ("x", "y"):
-            if heights.sizes[name] != 1:
-                raise ValueError(f"heights: found dimensions {names}, wanted y and x: select one along {name!r}")
-            heights = heights.isel({name: 0})
-    missing = [name for name in ("x", "y") if name not in heights.dims or name not in heights.coords]
+    heights = plan(heights)
+    rows, columns = heights.dims
+    missing = [name for name in (rows, columns) if name not in heights.coords]
     if missing:
-        raise ValueError(f"heights: found dimensions {names}, wanted y and x with coordinates; rename({{...: {missing[0]!r}}})")
-    heights = heights.transpose("y", "x")
-    x, y = (np.asarray(heights.coords[name].values, np.float64) for name in ("x", "y"))
-    return _real(heights.values), x, y[:, None]
+        raise ValueError(f"heights: found no coordinates along {missing[0]!r}, wanted y and x with coordinates")
+    x, y = (np.asarray(heights.coords[name].values, np.float64) for name in (columns, rows))
+    return real(heights.values), x, y[:, None]
 
 
 def _placed(rows: Any, columns: Any, transform: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -30,6 +30,8 @@ fn each_of(object: &Bound<'_, PyAny>, name: &'static str, count: usize) -> PyRes
 }
 
 /// Directions to the sun and lengths of steps: of positions, those by day, or of arrays.
+#[pyfunction]
+#[pyo3(name = "_suns")]
 pub fn suns(
     suns: &Bound<'_, PyAny>,
     weights: Option<&Bound<'_, PyAny>>,
