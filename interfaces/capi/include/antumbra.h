@@ -25,6 +25,7 @@
  *      4  scenes                          10  points: closest, inside, signed distance
  *      5  recipes and builds              11  trees that change, and worlds
  *      6  queries of one ray              12  files
+ *                                         13  height fields
  *
  * RULES OF ALL FUNCTIONS
  *
@@ -1097,6 +1098,61 @@ ANTUMBRA_API antumbra_status antumbra_world_from_memory(const uint8_t *bytes, si
 
 /* Frees memory that one of the functions above returned, with the number of bytes that it returned. */
 ANTUMBRA_API void antumbra_memory_free(uint8_t *bytes, size_t byte_count);
+
+/* ------------------------------------------------------------------------------------------------------------------------
+ * 13  Height fields
+ *
+ * What the cells of a raster of heights see, such as of a digital elevation model: exact for its surface, without a tree and
+ * without rays, for all cells at once. The surface has a vertex at the centre of each cell. Each square between four centres is
+ * two triangles, which share the diagonal from the first to the last of them: give rows from north to south and columns from west
+ * to east for the triangles that programs of maps have. A square with three centres is one triangle, and one with fewer is a hole.
+ *
+ * Answers are packed arrays of all cells, row by row, with the same bits for any number of threads. `threads` may be NULL.
+ *
+ * Errors: INVALID_ARGUMENT, NO_MEMORY.
+ * ------------------------------------------------------------------------------------------------------------------------ */
+
+/* Heights of cells, and where these are. */
+typedef struct antumbra_height_field antumbra_height_field;
+
+/* Makes a height field of rows * columns heights, row by row, which are copied. NAN is no data. `transform` has 6 numbers in
+ * the order of GDAL, and says where corners of cells are on the map: x = t[0] + column * t[1] + row * t[2], y = t[3] + column *
+ * t[4] + row * t[5]. NULL stands for cells of 1 in rows from north to south.
+ *
+ * Errors: INVALID_ARGUMENT if there are no cells, they have no size, or a height is infinite; NO_MEMORY. */
+ANTUMBRA_API antumbra_status antumbra_height_field_new(const double *heights, size_t rows, size_t columns, size_t stride,
+                                                       const double *transform, antumbra_height_field **field);
+
+/* Writes the azimuths of a lattice of so many, 8, 16, 32, 48, 80, 96, 144, 176 or 224: degrees from the north of the map (y)
+ * through east. They are steps between cells, and not evenly spread. */
+ANTUMBRA_API antumbra_status antumbra_height_field_lattice(const antumbra_height_field *field, size_t count, double *azimuths);
+
+/* Writes how high the horizon of each cell is in an azimuth, in degrees: -90 where no surface is ahead, NAN without data. Eyes
+ * are `rise` above their cells, and places d away lie `drop` * d * d lower; 0 for a flat earth. Azimuths of the lattices of 8
+ * and 16 take the least time. */
+ANTUMBRA_API antumbra_status antumbra_height_field_horizons(const antumbra_height_field *field, double azimuth, double rise,
+                                                            double drop, const antumbra_threads *threads, float *angles);
+
+/* Writes which cells see lights far away: bytes 1 or 0, for each light all cells. A light is 2 doubles, its azimuth and its
+ * elevation above the horizon in degrees, from -90 to 90. A light exactly on the horizon of a cell is hidden, and cells without
+ * data have 0. */
+ANTUMBRA_API antumbra_status antumbra_height_field_lit(const antumbra_height_field *field, const double *lights, size_t count,
+                                                       size_t stride, double rise, const antumbra_threads *threads,
+                                                       uint8_t *lit);
+
+/* Returns the height of the surface at x, y of the map; NAN beside it. */
+ANTUMBRA_API antumbra_status antumbra_height_field_height(const antumbra_height_field *field, double x, double y,
+                                                          double *height);
+
+/* Writes which cells an eye at x, y, z sees, 3 doubles on the map: bytes 1 or 0. A cell is seen if no part of the surface is above
+ * the line to its centre, raised by `target`, and it is at most `radius` away in plan, which may be INFINITY. An eye whose z is
+ * NAN is on the surface, and one below it sees nothing. `drop` is as for antumbra_height_field_horizons(). */
+ANTUMBRA_API antumbra_status antumbra_height_field_viewshed(const antumbra_height_field *field, const double *eye, double target,
+                                                            double radius, double drop, const antumbra_threads *threads,
+                                                            uint8_t *seen);
+
+/* Frees a height field. */
+ANTUMBRA_API void antumbra_height_field_free(antumbra_height_field *field);
 
 #ifdef __cplusplus
 }

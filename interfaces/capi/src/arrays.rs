@@ -26,7 +26,9 @@ macro_rules! plain {
 }
 
 plain!(u8, u32, u64, f32, f64, usize);
-plain!([f32; 3], [f32; 4], [f64; 3], [u32; 3], [u32; 4], [f32; 12]);
+plain!(
+    [f32; 3], [f32; 4], [f64; 2], [f64; 3], [u32; 3], [u32; 4], [f32; 12]
+);
 plain!(antumbra::Ray, antumbra::Hit, antumbra::PrimId);
 
 /// Fails if a pointer is null.

@@ -83,7 +83,7 @@ macro_rules! as_passed {
     )*};
 }
 
-as_passed! { u32; usize; Option<OnHit>; *const T, T; *mut T, T; }
+as_passed! { u32; usize; f64; Option<OnHit>; *const T, T; *mut T, T; }
 
 /// Arguments that a function of this library reads.
 macro_rules! read_by {

@@ -11,7 +11,7 @@
 //! - `learning`: orders that copies learn and others adopt
 //! - `single`: queries of one ray;  `batch`: many rays with conditions;  `queries`: what they hit;  `hits`: all they hit
 //! - `groups`: points times directions;  `points`: what is near points, and around them
-//! - `world`: instances that move;  `save`: files
+//! - `world`: instances that move;  `save`: files;  `fields`: what cells of height rasters see
 #![allow(
     clippy::missing_safety_doc,
     reason = "the header says what callers of each function promise"
@@ -29,6 +29,7 @@
 pub mod arrays;
 pub mod batch;
 pub mod build;
+pub mod fields;
 pub mod functions;
 pub mod groups;
 pub mod hits;

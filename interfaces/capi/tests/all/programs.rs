@@ -43,6 +43,11 @@ fn points_and_groups() {
 }
 
 #[test]
+fn height_fields() {
+    program(Language::C99, "c/fields.c");
+}
+
+#[test]
 fn worlds_refits_and_files() {
     program(Language::C99, "c/worlds.c");
 }
