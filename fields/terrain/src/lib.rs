@@ -8,6 +8,7 @@
 //! | the same in any other azimuth | [`March::horizons`] | a number for each cell |
 //! | which azimuths have such steps, and how much of the circle is each | [`Lattice`] | steps, degrees, weights |
 //! | which cells get light from a direction | [`Shadows::lit`] | a bit for each cell |
+//! | is a light hidden at any place above the surface | [`Skyline::hides`] | yes or no |
 //! | which cells does an observer see | [`Viewer::sees`] | a bit for each cell |
 //! | from which height above ground does an observer see them | [`Viewer::target_heights`] | a number for each cell |
 //! | how steep is the line of sight | [`Viewer::elevation`] | degrees of one cell |
@@ -34,7 +35,7 @@
 //! ```
 //!
 //! - `height_field`: heights as a surface of triangles;  `lattice`: steps and their azimuths
-//! - `sweep`, `march`: horizons;  `shadows`: light from far away;  `viewshed`: viewsheds
+//! - `sweep`, `march`: horizons;  `shadows`, `skyline`: light from far away;  `viewshed`: viewsheds
 //! - `crossing`: crossings of lines of sight with edges
 //! - `angles`: degrees;  `monitor`: progress and cancellation;  `memory`: lists that may not fit;  `error`: why there is no result
 #![forbid(unsafe_code)]
@@ -50,6 +51,7 @@ mod march;
 pub mod memory;
 mod monitor;
 mod shadows;
+mod skyline;
 mod sweep;
 mod viewshed;
 
@@ -62,5 +64,6 @@ pub use monitor::Monitor;
 #[doc(hidden)]
 pub use monitor::{Progress, Share};
 pub use shadows::{Shadows, per_cell};
+pub use skyline::{Light, Skyline};
 pub use sweep::Sweep;
 pub use viewshed::{Limits, Viewer};

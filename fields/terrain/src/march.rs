@@ -28,7 +28,7 @@ use crate::crossing::{Crossing, is_edge};
 use crate::{Error, HeightField, Monitor, Progress, memory};
 
 /// Cells on a side of the squares of each level. Cells of one of the smallest are walked from together.
-const SIDES: [usize; 3] = [SIDE, 64, 512];
+pub(crate) const SIDES: [usize; 3] = [SIDE, 64, 512];
 const SIDE: usize = 8;
 
 /// Slopes by which a stretch must be below the horizon: more than its bound is rounded.
@@ -49,7 +49,7 @@ impl<'a> March<'a> {
     /// # Errors
     /// [`Error::NoMemory`].
     pub fn new(field: &'a HeightField<'a>, rise: f64, drop: f64) -> Result<Self, Error> {
-        let [small, middle, large] = SIDES.map(|side| Peaks::new(field, side));
+        let [small, middle, large] = SIDES.map(|side| Peaks::new(field, side, 0));
         Ok(Self {
             field,
             rise,
@@ -105,38 +105,49 @@ impl<'a> March<'a> {
 }
 
 /// Largest height in each square of a level, row by row.
-struct Peaks {
+pub(crate) struct Peaks {
     columns: usize,
+    rows: usize,
     peaks: Vec<f64>,
 }
 
 impl Peaks {
-    fn new(field: &HeightField<'_>, side: usize) -> Result<Self, Error> {
+    /// Peaks of squares with so many cells on a side, and `more` cells of the next ones.
+    pub fn new(field: &HeightField<'_>, side: usize, more: usize) -> Result<Self, Error> {
         let [width, height] = field.size();
         let columns = width.div_ceil(side);
-        let count = columns * height.div_ceil(side);
-        let mut peaks = memory::filled("peaks", count, f64::NEG_INFINITY)?;
+        let rows = height.div_ceil(side);
+        let mut peaks = memory::filled("peaks", columns * rows, f64::NEG_INFINITY)?;
         for (row, heights) in field.heights().chunks_exact(width).enumerate() {
-            let peaks = &mut peaks[row / side * columns..][..columns];
-            for (peak, heights) in peaks.iter_mut().zip(heights.chunks(side)) {
-                // NaN does not count.
-                *peak = heights.iter().fold(*peak, |peak, &height| peak.max(height));
+            for square in row.saturating_sub(more) / side..=row / side {
+                let peaks = &mut peaks[square * columns..][..columns];
+                for (index, peak) in peaks.iter_mut().enumerate() {
+                    let heights = &heights[index * side..width.min((index + 1) * side + more)];
+                    // NaN does not count.
+                    *peak = heights.iter().fold(*peak, |peak, &height| peak.max(height));
+                }
             }
         }
-        Ok(Self { columns, peaks })
+        Ok(Self {
+            columns,
+            rows,
+            peaks,
+        })
     }
 
     /// The peak of all squares that have cells of some columns and rows, as far as there are any.
     #[inline(always)]
-    fn most(&self, side: usize, [columns, rows]: [Range<isize>; 2]) -> f64 {
+    pub fn most(&self, side: usize, [columns, rows]: [Range<isize>; 2]) -> f64 {
+        // Sides are powers of two.
+        let shift = side.trailing_zeros();
         let squares = |cells: Range<isize>, count: usize| {
-            let first = cells.start.div_euclid(side as isize).max(0) as usize;
-            let end = ((cells.end - 1).div_euclid(side as isize) + 1).max(0) as usize;
+            let first = (cells.start >> shift).max(0) as usize;
+            let end = (((cells.end - 1) >> shift) + 1).max(0) as usize;
             first..end.min(count)
         };
         let columns = squares(columns, self.columns);
         let mut most = f64::NEG_INFINITY;
-        for row in squares(rows, self.peaks.len() / self.columns) {
+        for row in squares(rows, self.rows) {
             for column in columns.clone() {
                 most = most.max(self.peaks[row * self.columns + column]);
             }
