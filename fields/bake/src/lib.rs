@@ -26,6 +26,7 @@
 //! | which suns does each point see, and for how long | [`sees_directions`], [`sun_hours`] | [`BitMatrix`], points x suns; `f64` |
 //! | how much energy does each point receive from the sun and the sky | [`SunJob`], [`run`] | [`SunValues`] |
 //! | the same for the cells of a height raster | [`FieldSunJob`], [`FieldSunJob::whole`] | [`SunValues`] |
+//! | the same for a scene in terrain, such as houses on a height raster | [`SunJob::within`], [`FieldSunJob::among`] | [`SunValues`] |
 //! | how much of the light of a surface arrives at others | [`view_factors`], [`ViewFactorJob`] | `f64`, surfaces x surfaces |
 //! | which cells of a height raster does each observer see | [`ViewshedJob`], [`run`] | [`Viewsheds`] |
 //! | how high must something on a cell be until an observer sees it | [`TargetHeightJob`], [`run`] | a number for each cell |
@@ -79,7 +80,7 @@
 //!   points that points see, and the job of the latter;  `horizon_angles`, `view_factors`: one job each;  `bits`: matrices of one
 //!   bit per answer;  `directions`: directions over a hemisphere;  `curvature`: lines of sight over a round earth
 //! - `sun`: `position`: where the sun is;  `sky`, `perez`: the sky in patches, and its light;  `moment`, `clock`, `epw`: dates, time
-//!   zones, weather files;  `sunlight`: the job of a period;  `exposure`, `hourly`, `measures`: sums, steps and classes
+//!   zones, weather files;  `sunlight`: the job of a period;  `surroundings`: scenes in terrain;  `exposure`, `hourly`, `measures`: sums, steps and classes
 //! - `rasters`: `viewshed`, `field_horizon`, `field_sun`: jobs of height rasters, which `antumbra-terrain` answers without rays;
 //!   `field_sky`: the sky that horizons leave open
 //! - `files`: `npz`: arrays for numpy;  `ply`, `glb`: meshes with a value at every vertex

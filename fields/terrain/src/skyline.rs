@@ -89,7 +89,7 @@ impl<'a> Skyline<'a> {
     /// Whether the surface hides a light at a column and a row, of which [`HeightField::place`] makes those that are exact, and a height.
     ///
     /// A light exactly on the horizon is hidden, as for [`Shadows`](crate::Shadows). The place may be beside the raster or in a hole. A
-    /// point below the surface sees nothing (see [`HeightField::buries`]), and neither does one that is not finite.
+    /// point below the surface sees nothing (see [`Skyline::buries`]), and neither does one that is not finite.
     ///
     /// ```
     /// use antumbra_terrain::{HeightField, Skyline};
@@ -103,14 +103,8 @@ impl<'a> Skyline<'a> {
     /// # Ok::<(), antumbra_terrain::Error>(())
     /// ```
     pub fn hides(&self, place: [f64; 2], height: f64, light: &Light) -> bool {
-        let normal = [0.0; 3];
-        let eye = Observer {
-            place,
-            height,
-            normal,
-        };
-        let is_nowhere = !eye.is_finite() || self.field.buries(&eye);
-        if is_nowhere || light.slope == f64::NEG_INFINITY {
+        let is_finite = place.iter().chain([&height]).all(|x| x.is_finite());
+        if !is_finite || self.buries(place, height) || light.slope == f64::NEG_INFINITY {
             return true;
         }
         let slope = light.slope.clamp(-STEEP, STEEP);
@@ -142,6 +136,16 @@ impl<'a> Skyline<'a> {
             }
         }
         ends[0] <= ends[1] && self.stops(&ray, SIDES.len() - 1, ends)
+    }
+
+    /// Whether a place is below the surface by more than rounding, as of [`HeightField::buries`].
+    pub fn buries(&self, place: [f64; 2], height: f64) -> bool {
+        let normal = [0.0; 3];
+        self.field.buries(&Observer {
+            place,
+            height,
+            normal,
+        })
     }
 
     /// Whether the surface stops a ray between two distances, in squares of a level.

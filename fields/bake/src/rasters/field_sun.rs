@@ -2,13 +2,15 @@
 
 use std::ops::Range;
 
-use antumbra::Bvh;
-use antumbra_terrain::angles::sin_cos_degrees;
+use antumbra::{Aabb, Bvh, Ray};
 use antumbra_terrain::{HeightField, Shadows, per_cell};
+use rayon::prelude::*;
 
 use crate::sun::sunlight::{Lights, Received, facing};
+use crate::vector::above;
 use crate::{
-    Answers, BitMatrix, Error, Job, Key, Monitor, Size, SunFound, SunValues, Sunlight, memory,
+    Answers, BitMatrix, Error, Job, Key, Monitor, Size, SunFound, SunValues, Sunlight,
+    Surroundings, memory, ones,
 };
 
 /// Job of [`SunValues`] of the cells of a height field, as of [`SunJob`](crate::SunJob), but by [`Shadows`]: exact, without rays, and
@@ -26,6 +28,17 @@ pub struct FieldSunJob<'a> {
     /// Normals of all cells; 0 without a triangle.
     normals: Vec<[f32; 3]>,
     by_month: bool,
+    scene: Option<Scene<'a>>,
+}
+
+/// A scene that hides lights as well.
+struct Scene<'a> {
+    terrain: &'a Surroundings<'a>,
+    tree: &'a Bvh,
+    /// Where rays of all cells begin; NaN without data.
+    origins: Vec<[f32; 3]>,
+    /// Directions to the lights.
+    directions: Vec<[f32; 3]>,
 }
 
 /// A cell, and the lights that it sees if these are kept.
@@ -49,22 +62,6 @@ impl<'a> FieldSunJob<'a> {
         (rise, north): (f64, f64),
         by_month: bool,
     ) -> Result<Self, Error> {
-        let suns = sunlight.suns.positions.iter();
-        let tangent = |elevation: f64| {
-            let (sin, cos) = sin_cos_degrees(elevation);
-            sin / cos
-        };
-        let suns = suns.map(|sun| [sun.azimuth + north, tangent(sun.elevation)]);
-        let patches = sunlight
-            .patches
-            .centres
-            .iter()
-            .map(|&[east, up_north, up]| {
-                [
-                    libm::atan2(east, up_north).to_degrees() + north,
-                    up / libm::hypot(east, up_north),
-                ]
-            });
         let [width, height] = field.size();
         let mut normals = memory::room("normals", width * height)?;
         for row in 0..height {
@@ -77,10 +74,41 @@ impl<'a> FieldSunJob<'a> {
             lights: Lights::new(sunlight)?,
             sunlight,
             rise,
-            directions: suns.chain(patches).collect(),
+            directions: sunlight.on_map(north),
             normals,
             by_month,
+            scene: None,
         })
+    }
+
+    /// The job of these cells among the surfaces of a tree, such as houses, which hide lights as the field does. `terrain` is the same
+    /// field.
+    ///
+    /// # Errors
+    /// [`Error::NoMemory`].
+    pub fn among(mut self, tree: &'a Bvh, terrain: &'a Surroundings<'a>) -> Result<Self, Error> {
+        let [width, _] = self.field.size();
+        let [x, _, _, y, _, _] = self.field.transform();
+        let mut origins = memory::room("origins", self.normals.len())?;
+        let heights = self.field.heights().iter().zip(&self.normals).enumerate();
+        origins.extend(heights.map(|(cell, (height, &normal))| {
+            let centre = [cell % width, cell / width].map(|at| at as f64 + 0.5);
+            let [east, north] = self.field.along(centre);
+            let point = terrain.point([x + east, y + north, height + self.rise]);
+            above(tree, &point, terrain.vector(normal))
+        }));
+        let orientation = terrain.orientation()?;
+        let suns = self.sunlight.suns.positions.iter();
+        let suns = suns.map(|sun| orientation.direction(sun.azimuth, sun.elevation));
+        let suns = suns.map(|direction| direction.map(|x| x as f32));
+        let patches = self.sunlight.patches.directions(&orientation);
+        self.scene = Some(Scene {
+            terrain,
+            tree,
+            origins,
+            directions: suns.chain(patches).collect(),
+        });
+        Ok(self)
     }
 
     /// Normals of the cells with data.
@@ -110,9 +138,27 @@ impl<'a> FieldSunJob<'a> {
         let batches = self.directions.chunks(BATCH).enumerate();
         let planes = batches.map(|(batch, directions)| {
             let monitor = Batch(monitor, [BATCH * batch, total]);
-            Ok(self.shadows.all_lit(directions, &monitor)?)
+            self.lit(BATCH * batch..BATCH * batch + directions.len(), &monitor)
         });
         self.sums(keeps, planes)
+    }
+
+    /// The cells that see each of some lights.
+    fn lit(&self, lights: Range<usize>, monitor: &dyn Monitor) -> Result<Vec<Vec<u64>>, Error> {
+        let directions = &self.directions[lights.clone()];
+        let mut planes = self.shadows.all_lit(directions, monitor)?;
+        if let Some(scene) = &self.scene {
+            let [width, _] = self.field.size();
+            let planes = planes.par_iter_mut().zip(&scene.directions[lights]);
+            planes.try_for_each(|(plane, &direction)| {
+                if monitor.cancelled() {
+                    return Err(Error::Cancelled);
+                }
+                scene.hide(plane, width, direction);
+                Ok(())
+            })?;
+        }
+        Ok(planes)
     }
 
     /// Sums over planes, which come in batches.
@@ -180,6 +226,44 @@ impl<'a> FieldSunJob<'a> {
     }
 }
 
+impl Scene<'_> {
+    /// Removes the cells whose light in a direction is hidden from those that see it.
+    fn hide(&self, plane: &mut [u64], width: usize, direction: [f32; 3]) {
+        let bounds = self.tree.bounds();
+        let rows = plane.chunks_exact_mut(width.div_ceil(64));
+        let (mut rays, mut hidden) = (Vec::new(), Vec::new());
+        for (row, origins) in rows.zip(self.origins.chunks_exact(width)) {
+            let may = |&column: &usize| meets(&bounds, origins[column], direction);
+            let columns: Vec<usize> = ones(row).filter(may).collect();
+            rays.clear();
+            rays.extend(
+                columns
+                    .iter()
+                    .map(|&column| Ray::new(origins[column], direction)),
+            );
+            hidden.clear();
+            hidden.resize(rays.len().div_ceil(64), 0);
+            let batch = self.tree.batch(&rays).on_this_thread();
+            batch.occluded_bits_into(&mut hidden);
+            for ray in ones(&hidden) {
+                row[columns[ray] / 64] &= !(1 << (columns[ray] % 64));
+            }
+        }
+    }
+}
+
+/// Whether a ray may meet a box: most cells are far from all houses.
+fn meets(bounds: &Aabb, origin: [f32; 3], direction: [f32; 3]) -> bool {
+    let (mut near, mut far) = (0.0, f32::INFINITY);
+    for axis in 0..3 {
+        let ends = [bounds.min, bounds.max].map(|end| (end[axis] - origin[axis]) / direction[axis]);
+        // NaN, of a ray along a side, does not count.
+        near = ends[0].min(ends[1]).max(near);
+        far = ends[0].max(ends[1]).min(far);
+    }
+    near <= far * (1.0 + 1e-5)
+}
+
 /// Progress of a batch, before which so many of all directions were done.
 struct Batch<'a>(&'a dyn Monitor, [usize; 2]);
 
@@ -215,13 +299,13 @@ impl Job for FieldSunJob<'_> {
         ));
         key.numbers(self.directions.as_flattened());
         key.numbers(self.field.heights());
+        if let Some(scene) = &self.scene {
+            scene.terrain.identify(key);
+        }
     }
 
     fn answers(&self, _: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers<Self> {
-        Ok(self
-            .shadows
-            .all_lit(&self.directions[items], monitor)?
-            .concat())
+        Ok(self.lit(items, monitor)?.concat())
     }
 
     fn found(&self, words: Vec<u64>) -> Result<SunFound, Error> {

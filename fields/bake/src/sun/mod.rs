@@ -10,6 +10,7 @@ pub(crate) mod perez;
 pub(crate) mod position;
 pub(crate) mod sky;
 pub(crate) mod sunlight;
+pub(crate) mod surroundings;
 
 pub use clock::Clock;
 pub use epw::{BadWeather, Record, Weather};
@@ -21,3 +22,4 @@ pub use perez::{Irradiance, perez_sky};
 pub use position::{Place, Refraction, SunPosition, sun_positions};
 pub use sky::{SkyDivision, SkyPatches};
 pub use sunlight::{SunFound, SunJob, SunValues, Sunlight, Suns, TimeStep};
+pub use surroundings::Surroundings;

@@ -3,6 +3,8 @@
 use std::ops::Range;
 
 use antumbra::Bvh;
+use antumbra_terrain::Light;
+use antumbra_terrain::angles::sin_cos_degrees;
 use rayon::prelude::*;
 
 use crate::memory;
@@ -10,7 +12,7 @@ use crate::points::curve::Places;
 use crate::vector::dot;
 use crate::{
     Answers, BitMatrix, Clock, Error, Irradiance, Job, Key, Moment, Monitor, Orientation, Place,
-    Refraction, Size, SkyPatches, SunPosition, Weather, Weighting, ones, perez_sky,
+    Refraction, Size, SkyPatches, SunPosition, Surroundings, Weather, Weighting, ones, perez_sky,
     sees_directions, sun_positions,
 };
 
@@ -186,6 +188,21 @@ impl Sunlight {
     /// Directions to the patches of the sky, `[patches, 3]`.
     pub fn patch_directions(&self) -> Vec<[f32; 3]> {
         self.patches.directions(&self.orientation)
+    }
+
+    /// Azimuths from the north of a map and slopes of the suns, then of the patches. `north` is the angle from there to true north.
+    pub(crate) fn on_map(&self, north: f64) -> Vec<[f64; 2]> {
+        let suns = self.suns.positions.iter().map(|sun| {
+            let (sin, cos) = sin_cos_degrees(sun.elevation);
+            [sun.azimuth + north, sin / cos]
+        });
+        let patches = self.patches.centres.iter().map(|&[east, up_north, up]| {
+            [
+                libm::atan2(east, up_north).to_degrees() + north,
+                up / libm::hypot(east, up_north),
+            ]
+        });
+        suns.chain(patches).collect()
     }
 
     /// Steps of time with their suns.
@@ -508,6 +525,8 @@ pub struct SunJob<'a> {
     sunlight: &'a Sunlight,
     /// Directions to the suns, then to the patches.
     directions: Vec<[f32; 3]>,
+    /// Terrain, and the same lights seen from there.
+    terrain: Option<(&'a Surroundings<'a>, Vec<Light>)>,
 }
 
 /// Result of a [`SunJob`].
@@ -535,7 +554,18 @@ impl<'a> SunJob<'a> {
             places: Places::new(points, normals)?,
             sunlight,
             directions: [sunlight.sun_directions(), sunlight.patch_directions()].concat(),
+            terrain: None,
         })
+    }
+
+    /// The job of these sensors in terrain, which hides lights as the scene does. Sensors below its surface see nothing.
+    ///
+    /// # Errors
+    /// [`Error::NoMemory`].
+    pub fn within(mut self, terrain: &'a Surroundings<'a>) -> Result<Self, Error> {
+        let lights = terrain.lights(&self.sunlight.on_map(terrain.north()))?;
+        self.terrain = Some((terrain, lights));
+        Ok(self)
     }
 
     /// Number of rays: one to each sun and patch above the plane of each sensor.
@@ -571,12 +601,19 @@ impl Job for SunJob<'_> {
     fn identify(&self, key: &mut Key) {
         key.places(&self.places);
         key.vectors(&self.directions);
+        if let Some((terrain, _)) = &self.terrain {
+            terrain.identify(key);
+        }
     }
 
     fn answers(&self, bvh: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers<Self> {
         let ([points, normals], far) = (self.places.at(items), f32::INFINITY);
         let seen = sees_directions(bvh, points, normals, &self.directions, far, monitor)?;
-        Ok(seen.into_words())
+        let mut words = seen.into_words();
+        if let Some((terrain, lights)) = &self.terrain {
+            terrain.hide((bvh, points), lights, &mut words, monitor)?;
+        }
+        Ok(words)
     }
 
     fn found(&self, words: Vec<u64>) -> Result<SunFound, Error> {

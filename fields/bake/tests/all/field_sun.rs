@@ -8,10 +8,10 @@ use antumbra_bake::{
 use antumbra_raster::{Grid, Raster};
 use antumbra_terrain::March;
 
-const NORTH: f64 = 3.7;
+pub const NORTH: f64 = 3.7;
 
 /// A day in steps of ten minutes, with light.
-fn sunlight() -> Sunlight {
+pub fn sunlight(up: UpAxis) -> Sunlight {
     let place = Place {
         latitude: 47.0,
         longitude: 9.0,
@@ -32,12 +32,12 @@ fn sunlight() -> Sunlight {
         };
     }
     let patches = SkyDivision::Tregenza.patches().expect("patches");
-    let plan = Orientation::new(UpAxis::Z, NORTH).expect("an orientation");
+    let plan = Orientation::new(up, NORTH).expect("an orientation");
     Sunlight::new(&place, steps, true, patches, plan).expect("sunlight")
 }
 
 /// Hills with small noise, houses, and holes for this part of the cells. Heights are multiples of 2^-10, which single precision holds.
-fn village([width, height]: [usize; 2], cell: f64, holes: f64) -> Raster {
+pub fn village([width, height]: [usize; 2], cell: f64, holes: f64) -> Raster {
     let noise = |cell: usize| (cell * 7919 % 1013) as f64 / 1013.0;
     let values = (0..width * height).map(|cell| {
         let [x, y] = [cell % width, cell / width];
@@ -66,7 +66,7 @@ fn by_rays(raster: &Raster, sunlight: &Sunlight) -> (SunFound, Vec<[f32; 3]>) {
 
 #[test]
 fn cells_receive_what_rays_say() {
-    let sunlight = sunlight();
+    let sunlight = sunlight(UpAxis::Z);
     let (mut bits, mut differing) = (0, 0);
     for holes in [0.0, 0.03] {
         let raster = village([70, 50], 2.0, holes);
@@ -131,7 +131,7 @@ fn cells_receive_what_rays_say() {
 
 #[test]
 fn batches_and_jobs_have_the_same_bits() {
-    let sunlight = sunlight();
+    let sunlight = sunlight(UpAxis::Z);
     let raster = village([67, 40], 1.0, 0.02);
     let size = [raster.grid.width, raster.grid.height];
     let field = HeightField::new(size, &raster.values, raster.grid.transform).expect("a field");

@@ -13,12 +13,12 @@ fn tree() -> Bvh {
 }
 
 /// What so many shares of a job find together.
-fn in_shares<J: Job>(job: &J, shares: u32) -> J::Found {
+pub fn in_shares<J: Job>(job: &J, bvh: &Bvh, shares: u32) -> J::Found {
     let key = Key::of(job, |_| {});
     let mut together = Work::new(job, key, [0, 1], Vec::new());
     for index in 0..shares {
         let mut work = Work::new(job, key, [index, shares], Vec::new());
-        while work.step(&tree(), &()).expect("a step") {}
+        while work.step(bvh, &()).expect("a step") {}
         let mut file = Vec::new();
         work.write(&mut file).expect("bytes");
         let part = Part::read(&file).expect("a part");
@@ -384,7 +384,7 @@ fn shares_and_threads_have_the_same_bits() {
     assert_eq!(pool.install(|| case.run(&observers)), whole);
     let field = case.field();
     let job = case.job(&field, &observers);
-    assert_eq!(in_shares(&job, 2), whole);
+    assert_eq!(in_shares(&job, &tree(), 2), whole);
     // One by one, and as a matrix.
     let matrix = whole
         .matrix(&(0..4800).collect::<Vec<_>>())
@@ -416,7 +416,7 @@ fn shares_have_the_least_heights_and_angles_of_all_observers() {
     let job = TargetHeightJob(case.job(&field, &observers));
     let whole = job.heights(&()).expect("heights");
     let bits = |heights: &[f32]| heights.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
-    assert_eq!(bits(&in_shares(&job, 3)), bits(&whole));
+    assert_eq!(bits(&in_shares(&job, &tree(), 3)), bits(&whole));
     // Cells that nobody sees are those whose least height is above the target, and the others have the least of all angles.
     let sheds = case.run(&observers);
     let angles = case.job(&field, &observers).elevations(&sheds);

@@ -5,6 +5,7 @@
 //! - `viewshed`, `height_fields`: terrain, against all triangles in double precision
 //! - `field_sun`: sun and sky of terrain, against rays
 //! - `sky`: how much of it cells see, against closed forms and sums over elevations
+//! - `surroundings`: houses in terrain, against both as one mesh
 //! - `promises`: equal bits, errors, cancellation
 
 mod closed_forms;
@@ -13,5 +14,6 @@ mod height_fields;
 mod promises;
 mod reference;
 mod sky;
+mod surroundings;
 mod viewshed;
 mod visibility;
