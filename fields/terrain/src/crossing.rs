@@ -70,8 +70,8 @@ pub(crate) fn floor(place: f64) -> isize {
     towards_zero - isize::from(towards_zero as f64 > place)
 }
 
-/// The edge that a line of sight meets on a line of a family, and the part of it before the crossing. `place` is the coordinate that
-/// tells places on the line apart. Both ends are one if the line of sight crosses a corner.
+/// The edge that a line of sight crosses on a line of a family, and the part of it before the crossing. `place` is the coordinate that
+/// differs along the line. Both ends are one if the line of sight crosses a corner.
 #[inline(always)]
 pub(crate) fn edge_at((family, along): Family, line: isize, place: f64) -> ([[isize; 2]; 2], f64) {
     let low = floor(place);

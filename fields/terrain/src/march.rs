@@ -135,6 +135,10 @@ impl Peaks {
         })
     }
 
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.peaks[..])
+    }
+
     /// The peak of all squares that have cells of some columns and rows, as far as there are any.
     #[inline(always)]
     pub fn most(&self, side: usize, [columns, rows]: [Range<isize>; 2]) -> f64 {

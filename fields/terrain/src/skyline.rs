@@ -7,7 +7,7 @@
 //! nothing is looked at.
 //!
 //! Stretches are divided by computed distances, and crossings near their ends belong to both. So rounding decides only how much is looked
-//! at: what counts are the slopes of crossings, which have the bits of those of `March` at the centres of cells.
+//! at. What counts are slopes of crossings, which at the centres of cells have the same bits as in `March`.
 
 use crate::crossing::{CLOSE, edge_at, floor, is_edge};
 use crate::height_field::{Family, families};
@@ -136,6 +136,11 @@ impl<'a> Skyline<'a> {
             }
         }
         ends[0] <= ends[1] && self.stops(&ray, SIDES.len() - 1, ends)
+    }
+
+    /// Memory of the peaks.
+    pub fn bytes(&self) -> usize {
+        self.levels.iter().map(Peaks::bytes).sum()
     }
 
     /// Whether a place is below the surface by more than rounding, as of [`HeightField::buries`].

@@ -233,7 +233,7 @@ impl Scene<'_> {
         let rows = plane.chunks_exact_mut(width.div_ceil(64));
         let (mut rays, mut hidden) = (Vec::new(), Vec::new());
         for (row, origins) in rows.zip(self.origins.chunks_exact(width)) {
-            let may = |&column: &usize| meets(&bounds, origins[column], direction);
+            let may = |&column: &usize| may_hit(&bounds, origins[column], direction);
             let columns: Vec<usize> = ones(row).filter(may).collect();
             rays.clear();
             rays.extend(
@@ -252,8 +252,8 @@ impl Scene<'_> {
     }
 }
 
-/// Whether a ray may meet a box: most cells are far from all houses.
-fn meets(bounds: &Aabb, origin: [f32; 3], direction: [f32; 3]) -> bool {
+/// Whether a ray may hit a box: most cells are far from all houses.
+fn may_hit(bounds: &Aabb, origin: [f32; 3], direction: [f32; 3]) -> bool {
     let (mut near, mut far) = (0.0, f32::INFINITY);
     for axis in 0..3 {
         let ends = [bounds.min, bounds.max].map(|end| (end[axis] - origin[axis]) / direction[axis]);

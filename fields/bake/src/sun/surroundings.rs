@@ -48,6 +48,11 @@ impl<'a> Surroundings<'a> {
         (place, z + f64::from(bvh.origin_offset(point)))
     }
 
+    /// Memory beside the heights of the field.
+    pub fn bytes(&self) -> usize {
+        self.skyline.bytes()
+    }
+
     /// How many points are below the surface, from where nothing is seen.
     pub fn buried(&self, bvh: &Bvh, points: &[[f32; 3]]) -> usize {
         let is_below = |point: &&[f32; 3]| {
