@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use antumbra_bake::{Surface, UpAxis};
+use clap::builder::ArgPredicate;
 use clap::{Args, ValueEnum};
 
 use super::{heading, values};
@@ -33,13 +34,22 @@ pub struct PlaceArgs {
     /// Only on one object of the scene, by its name
     ///
     /// As --by object names it. Everything else still casts shadows. With --grid or --surfaces.
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["vertices", "sensors", "along"])]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["vertices", "cells", "sensors", "along"])]
     pub only: Option<String>,
     /// A sensor at every vertex
     ///
     /// Vertices of a height raster are the centres of its cells.
-    #[arg(long, visible_alias = "cells", group = "where")]
+    #[arg(
+        long,
+        group = "where",
+        default_value_if("cells", ArgPredicate::IsPresent, "true")
+    )]
     pub vertices: bool,
+    /// A sensor at every cell of a height raster
+    ///
+    /// The raster is the scene, or the one of sun --terrain. Without either, vertices of the scene are meant.
+    #[arg(long, group = "where")]
+    pub cells: bool,
     #[command(flatten)]
     pub placement: PlacementArgs,
     /// Axis that points up [default: the scene's]

@@ -240,8 +240,13 @@ impl Bake<'_> {
 
     /// Starts the threads and reads a height raster, for a job without a mesh and without a tree.
     pub fn terrain(&self, files: &mut Files) -> Result<Terrain, Failure> {
+        self.terrain_of(self.scene, files)
+    }
+
+    /// Starts the threads and reads a height raster around the scene.
+    pub fn terrain_of(&self, raster: &[PathBuf], files: &mut Files) -> Result<Terrain, Failure> {
         self.start_threads()?;
-        Terrain::load(self.scene, self.memory, files)
+        Terrain::load(raster, self.memory, files)
     }
 
     /// Computes a job, or one share of it, with a tree of the scene. With parts, joins them instead.

@@ -29,13 +29,13 @@ fn square(wall: bool, up: char) -> String {
     text + &faces
 }
 
-const VIENNA: [&str; 4] = ["--lat", "48.2", "--lon", "16.4"];
+pub const VIENNA: [&str; 4] = ["--lat", "48.2", "--lon", "16.4"];
 
 /// Columns of a table by name.
-struct Table(Vec<String>, Vec<Vec<f64>>);
+pub struct Table(Vec<String>, Vec<Vec<f64>>);
 
 impl Table {
-    fn column(&self, name: &str) -> Vec<f64> {
+    pub fn column(&self, name: &str) -> Vec<f64> {
         let place = self.0.iter().position(|other| other == name);
         let place = place.unwrap_or_else(|| panic!("no column {name} in {:?}", self.0));
         self.1.iter().map(|row| row[place]).collect()
@@ -43,7 +43,7 @@ impl Table {
 }
 
 impl Place {
-    fn table(&self, name: &str) -> Table {
+    pub fn table(&self, name: &str) -> Table {
         let text = fs::read_to_string(self.path(name)).expect("a table");
         let mut lines = text.lines();
         let head = lines
@@ -66,15 +66,20 @@ impl Place {
         self.table("sun.csv")
     }
 
-    fn read(&self, name: &str) -> Vec<u8> {
+    pub fn read(&self, name: &str) -> Vec<u8> {
         fs::read(self.path(name)).expect("a file")
     }
 }
 
 /// Hours from June to August with the sun above the horizon in the middle of the hour, of those that `counts`.
 fn summer(counts: impl Fn(f64, f64) -> bool) -> f64 {
-    let begin: Moment = "2025-06-01".parse().expect("a moment");
-    let times: Vec<f64> = (0..92 * 24)
+    hours(("2025-06-01", 92), counts)
+}
+
+/// The same of so many days from a date on.
+pub fn hours((from, days): (&str, u32), counts: impl Fn(f64, f64) -> bool) -> f64 {
+    let begin: Moment = from.parse().expect("a moment");
+    let times: Vec<f64> = (0..days * 24)
         .map(|hour| begin.unix(1.0) + 3600.0 * (f64::from(hour) + 0.5))
         .collect();
     let site = Site {

@@ -34,7 +34,7 @@ fn place() -> Place {
 }
 
 impl Place {
-    fn raster(&self, name: &str) -> Raster {
+    pub fn raster(&self, name: &str) -> Raster {
         read(&self.path(name), u64::MAX, Purpose::Values).expect("a raster")
     }
 }
@@ -528,7 +528,7 @@ fn what_cannot_be_placed_is_refused() {
 }
 
 impl Place {
-    fn write_raster(&self, name: &str, grid: &Grid, heights: &[f32], unit: &str) {
+    pub fn write_raster(&self, name: &str, grid: &Grid, heights: &[f32], unit: &str) {
         let quantity = Quantity {
             name: "height",
             unit,

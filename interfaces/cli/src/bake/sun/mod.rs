@@ -1,9 +1,11 @@
 //! `antumbra sun`: hours of direct sun, sky view factors and irradiation of sensors.
 //!
-//! The steps of the command, each in a file of its own: `when`: place and times, before anything is traced;  `values`: the list of
+//! The steps of the command, each in a file of its own: `when`: place and times, before anything is traced;  `around`: terrain around
+//! the scene;  `values`: the list of
 //! values, after it;  `outputs`, with the `words` of maps;  `hourly`, `frames`, `groups`: values by step of time, moving shadows,
 //! means by object;  `report`: what is said at the end
 
+mod around;
 mod frames;
 mod groups;
 mod hourly;
@@ -19,7 +21,8 @@ use std::time::Instant;
 
 use antumbra::LocalOrigin;
 use antumbra_bake::{
-    FieldSunJob, Moment, Sensors, SkyDivision, SunFound, SunJob, Sunlight, UpAxis, Weather,
+    FieldSunJob, Moment, Sensors, SkyDivision, SunFound, SunJob, Sunlight, Surroundings, UpAxis,
+    Weather,
 };
 use clap::{ArgGroup, Args};
 
@@ -96,6 +99,13 @@ pub struct SunArgs {
     pub json: Option<Destination>,
     #[command(flatten)]
     pub places: PlaceArgs,
+    /// Height raster around the scene, which casts shadows
+    ///
+    /// Hills hide the sun and the sky as the scene does, without a mesh of them. Several files, a folder or a .vrt, in the coordinates
+    /// of the scene. Its coordinate system gives place, unit and north, unless flags do. With --cells, sensors are its cells, on which
+    /// the scene casts shadows.
+    #[arg(long, value_name = "RASTER", num_args = 1.., help_heading = heading::SUN)]
+    pub terrain: Vec<PathBuf>,
     /// Latitude, south negative [default: by --crs]
     ///
     /// If absent: the middle of the scene in its coordinate system (--crs, or the one in a GeoTIFF), or else the place of --epw.
@@ -195,6 +205,8 @@ struct Baked<'a> {
     /// Name of the weather.
     weather: Option<&'a str>,
     up: UpAxis,
+    /// Figures of terrain around the scene.
+    around: Option<around::Figures<'a>>,
 }
 
 impl Baking for SunArgs {
@@ -204,7 +216,7 @@ impl Baking for SunArgs {
                 Format::Picture if self.places.grid.is_none() => {
                     return Err(Failure::name(path, "a map needs --grid"));
                 }
-                Format::Raster => places::check_raster(path, &self.places, &self.scene)?,
+                Format::Raster => places::check_raster(path, &self.places, self.raster_scene())?,
                 _ => {}
             }
         }
@@ -229,6 +241,7 @@ impl Baking for SunArgs {
     fn files(&self) -> [Vec<Named<'_>>; 2] {
         let mut read = self.places.files().to_vec();
         read.push(("--epw", self.epw.as_deref()));
+        read.extend(self.terrain.iter().map(|path| ("--terrain", Some(&**path))));
         let written = vec![
             ("--hourly", self.hourly.as_deref()),
             ("--groups", self.groups.as_deref()),
@@ -238,14 +251,24 @@ impl Baking for SunArgs {
     }
 
     fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
+        around::check(self)?;
         let begin = Instant::now();
         let weather = self.epw.as_deref().map(read_weather).transpose()?;
-        if self.places.vertices && is_terrain(&self.scene, self.places.up) {
+        if self.places.vertices && is_terrain(self.raster_scene(), self.places.up)
+            || self.has_terrain_cells()
+        {
             return self.of_cells(bake, (weather.as_ref(), begin), files);
         }
+        let terrain =
+            (!self.terrain.is_empty()).then(|| bake.terrain_of(&self.terrain, &mut files));
+        let terrain = terrain.transpose()?;
+        terrain.iter().for_each(Terrain::tell_read);
         let mut ground = bake.ground(&mut files, None)?;
         let up = ground.up(self.places.up)?;
-        let site = Asked::new(&self.raster, &self.places).of(&ground.loaded, up)?;
+        let site = match &terrain {
+            Some(terrain) => around::settle(self, (&ground, up), terrain)?,
+            None => Asked::new(&self.raster, &self.places).of(&ground.loaded, up)?,
+        };
         let (when, sunlight) = When::at(self, weather.as_ref(), site, up)?;
         let mut frames = self.frames.iter();
         frames.try_for_each(|path| frames::declare(path, &sunlight, &mut files))?;
@@ -254,7 +277,20 @@ impl Baking for SunArgs {
             ground.face(&sunlight.orientation);
         }
         let sensors = &places.sensors;
-        let job = SunJob::new(&sensors.points, &sensors.normals, &sunlight)?;
+        let field = terrain.as_ref().map(Terrain::field).transpose()?;
+        let around = field.as_ref().map(|field| {
+            let compass = (up, self.places.north.degrees());
+            Surroundings::new(field, ground.local, compass)
+        });
+        let around = around.transpose()?;
+        let mut job = SunJob::new(&sensors.points, &sensors.normals, &sunlight)?;
+        let mut figures = None;
+        if let (Some(terrain), Some(around)) = (&terrain, &around) {
+            job = job.within(around)?;
+            let below = around.buried(&ground.bvh, &sensors.points);
+            let below = [below, sensors.points.len()];
+            figures = Some(around::figures(terrain, &ground, around, below));
+        }
         let done = bake.compute(&job, &ground, &ground.bvh)?;
         let baked = Baked {
             name: &ground.loaded.scene.name,
@@ -268,26 +304,50 @@ impl Baking for SunArgs {
             when: &when,
             weather: weather.as_ref().map(|weather| &*weather.name),
             up,
+            around: figures,
         };
         let triangles = ground.mesh.indices.len();
-        let seconds = [ground.loaded.seconds, ground.build_seconds];
+        let read = terrain.as_ref().map_or(0.0, |terrain| terrain.load_seconds);
+        let seconds = [read + ground.loaded.seconds, ground.build_seconds];
         baked.end(bake, (triangles, job.rays(), seconds, begin), &done)
     }
 }
 
 impl SunArgs {
-    /// Sun and sky of the cells of a height raster: without a mesh, unless outputs are made of one.
+    /// Whether sensors are the cells of `--terrain`.
+    fn has_terrain_cells(&self) -> bool {
+        self.places.cells && !self.terrain.is_empty()
+    }
+
+    /// The raster whose cells may be sensors: the scene, if it is one, or the terrain around it.
+    fn raster_scene(&self) -> &[PathBuf] {
+        match self.has_terrain_cells() {
+            true => &self.terrain,
+            false => &self.scene,
+        }
+    }
+
+    /// Sun and sky of the cells of a height raster: without a mesh, unless outputs are made of one or it is around a scene.
     fn of_cells(
         &self,
         bake: &Bake<'_>,
         (weather, begin): (Option<&Weather>, Instant),
         mut files: Files,
     ) -> Result<(), Failure> {
-        let terrain = bake.terrain(&mut files)?;
+        let terrain = bake.terrain_of(self.raster_scene(), &mut files)?;
         terrain.tell_read();
-        let site = terrain.settle(&Asked::new(&self.raster, &self.places))?;
+        let town = self.has_terrain_cells().then(|| {
+            let ground = bake.ground(&mut files, None)?;
+            let up = ground.up(self.places.up)?;
+            Ok::<_, Failure>((ground, up))
+        });
+        let town = town.transpose()?;
+        let site = match &town {
+            Some((ground, up)) => around::settle(self, (ground, *up), &terrain)?,
+            None => terrain.settle(&Asked::new(&self.raster, &self.places))?,
+        };
         let (when, sunlight) = When::at(self, weather, site, UpAxis::Z)?;
-        let has_mesh = self.groups.is_some() || self.writes(&["ply"]);
+        let has_mesh = town.is_none() && (self.groups.is_some() || self.writes(&["ply"]));
         let ground = has_mesh.then(|| bake.ground(&mut files, None));
         let ground = ground.transpose()?.map(|mut ground| {
             if self.groups.is_some() {
@@ -303,13 +363,24 @@ impl SunArgs {
         let rise = self.places.placement.height / self.places.units.metres();
         let by_month = self.writes(&["csv", "npz"]);
         let job = FieldSunJob::new(&field, &sunlight, (rise, north), by_month);
-        let job = job.map_err(|error| Failure::scene(&terrain.name, error))?;
+        let mut job = job.map_err(|error| Failure::scene(&terrain.name, error))?;
+        let around = town.as_ref().map(|(ground, up)| {
+            let around = Surroundings::new(&field, ground.local, (*up, north))?;
+            Ok::<_, Failure>((ground, around))
+        });
+        let around = around.transpose()?;
+        let mut figures = None;
+        if let Some((ground, around)) = &around {
+            job = job.among(&ground.bvh, around)?;
+            figures = Some(around::figures(&terrain, ground, around, [0; 2]));
+        }
         let mut sensors = terrain.sensors(rise);
         sensors.normals = job.normals();
         let build_seconds = start.elapsed().as_secs_f64();
-        let done = match bake.is_whole() {
-            true => self.whole(&job, &terrain.name)?,
-            false => bake.compute_cells(&job, &terrain.name)?,
+        let done = match &town {
+            _ if bake.is_whole() => self.whole(&job, &terrain.name)?,
+            Some((ground, _)) => bake.compute(&job, ground, &ground.bvh)?,
+            None => bake.compute_cells(&job, &terrain.name)?,
         };
         let baked = Baked {
             name: &terrain.name,
@@ -323,11 +394,14 @@ impl SunArgs {
             when: &when,
             weather: weather.map(|weather| &*weather.name),
             up: UpAxis::Z,
+            around: figures,
         };
         let seconds = [terrain.load_seconds, build_seconds];
         let directions = sunlight.suns.times.len() + sunlight.patches.len();
         let answers = (directions * sensors.points.len()) as u64;
-        baked.end(bake, (field.triangles(), answers, seconds, begin), &done)
+        let own = town.as_ref().map(|(ground, _)| ground.mesh.indices.len());
+        let triangles = own.unwrap_or_else(|| field.triangles());
+        baked.end(bake, (triangles, answers, seconds, begin), &done)
     }
 
     /// Computes all of a job with little memory.
@@ -370,13 +444,19 @@ impl<'a> Baked<'a> {
         let shown = [Shown::Hours, Shown::SkyView, Shown::Direct, Shown::Diffuse];
         let means @ [hours, view, direct, diffuse] = shown.map(|shown| self.value(shown)?.mean());
         let number = if done.found.is_some() { number } else { 0 };
-        let rays = if self.terrain.is_some() { 0 } else { number };
+        let rays = match (self.terrain, &self.around) {
+            // Only cells that the terrain leaves lit have rays.
+            (Some(_), Some(_)) => None,
+            (Some(_), None) => Some(0),
+            (None, _) => Some(number),
+        };
         let (suns, place) = (&sunlight.suns, &self.when.place);
         let total = begin.elapsed().as_secs_f64();
         let figures: &[Figure<'_>] = &[
             ("outputs", &bake.output_names()),
             ("shard", &bake.shard()),
             ("triangles", &triangles),
+            ("terrain", &self.around),
             ("sensors", &sensors.points.len()),
             ("place", &self.weather),
             ("latitude", &place.latitude),
@@ -404,6 +484,9 @@ impl<'a> Baked<'a> {
                 (Some(terrain), _) => terrain.tell(),
                 (None, Some((ground, _))) => ground.tell(""),
                 (None, None) => {}
+            }
+            if let Some(around) = &self.around {
+                around.tell(triangles);
             }
             self.tell(found, means);
             let things = if self.terrain.is_some() {

@@ -46,7 +46,8 @@ const MOST_APART: f64 = 3.0;
 /// Refuses flags that leave the place open, before anything is read.
 pub fn check(args: &SunArgs) -> Result<(), Failure> {
     let is_given = args.lat.is_some() || args.epw.is_some();
-    match is_given || args.raster.crs.is_some() || is_raster(&args.scene) {
+    let may_say = is_raster(&args.scene) || !args.terrain.is_empty();
+    match is_given || args.raster.crs.is_some() || may_say {
         true => Ok(()),
         false => Err(no_place()),
     }
