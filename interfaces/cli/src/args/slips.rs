@@ -87,6 +87,18 @@ fn explained(mut error: clap::Error) -> clap::Error {
                 error.insert(ContextKind::Suggested, tip);
             }
         }
+        ErrorKind::MissingRequiredArgument => {
+            let is_scene = |arg: &String| arg.starts_with("<SCENE>");
+            let missing = match error.get(ContextKind::InvalidArg) {
+                Some(ContextValue::Strings(all)) => all.iter().any(is_scene),
+                _ => false,
+            };
+            if missing && std::env::args_os().any(|arg| arg == "--terrain") {
+                let tip = "the scene goes before `--terrain`, which takes several files";
+                let tip = ContextValue::StyledStrs(vec![StyledStr::from(tip)]);
+                error.insert(ContextKind::Suggested, tip);
+            }
+        }
         _ => {}
     }
     error

@@ -286,4 +286,16 @@ fn terrain_says_where_a_scene_is_and_must_be_there() {
             "{args:?}"
         );
     }
+    let slip = [
+        "--sensors",
+        "points.csv",
+        "-o",
+        "a.csv",
+        "--terrain",
+        "dem.tif",
+        "map.obj",
+    ];
+    let run = place.run(&[&["sun"], &slip[..]].concat()).expect(2);
+    let words = "the scene goes before `--terrain`";
+    assert!(run.stderr.contains(words), "{}", run.stderr);
 }

@@ -101,8 +101,8 @@ pub struct SunArgs {
     pub places: PlaceArgs,
     /// Height raster around the scene, which casts shadows
     ///
-    /// Hills hide the sun and the sky as the scene does, without a mesh of them. Several files, a folder or a .vrt, in the coordinates
-    /// of the scene. Its coordinate system gives place, unit and north, unless flags do. With --cells, sensors are its cells, on which
+    /// Hills hide the sun and the sky as the scene does, without a mesh of them. Several files, a folder or a .vrt, after the scene and
+    /// in its coordinates. Its coordinate system gives place, unit and north, unless flags do. With --cells, sensors are its cells, on which
     /// the scene casts shadows.
     #[arg(long, value_name = "RASTER", num_args = 1.., help_heading = heading::SUN)]
     pub terrain: Vec<PathBuf>,
