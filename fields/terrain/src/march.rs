@@ -31,6 +31,9 @@ use crate::{Error, HeightField, Monitor, Progress, memory};
 pub(crate) const SIDES: [usize; 3] = [SIDE, 64, 512];
 const SIDE: usize = 8;
 
+/// Cells on a side of the tiles whose squares are walked from one after the other, such that they read the same heights.
+const TILE: usize = 64;
+
 /// Slopes by which a stretch must be below the horizon: more than its bound is rounded.
 const SLACK: f64 = 1e-12;
 
@@ -84,8 +87,8 @@ impl<'a> March<'a> {
         let [width, height] = self.field.size();
         let way = Way::new(self, azimuth);
         let mut found = memory::filled("horizons", width * height, f32::NAN)?;
-        let rows = found.par_chunks_mut(SIDE * width).enumerate();
-        let progress = Progress::new(monitor, height.div_ceil(SIDE));
+        let rows = found.par_chunks_mut(TILE * width).enumerate();
+        let progress = Progress::new(monitor, height.div_ceil(TILE));
         rows.try_for_each(|(index, found)| {
             if monitor.cancelled() {
                 return Err(Error::Cancelled);
@@ -93,7 +96,7 @@ impl<'a> March<'a> {
             Isa::best().dispatch(Band {
                 march: self,
                 way: &way,
-                row: index * SIDE,
+                row: index * TILE,
                 of: &of,
                 found,
             });
@@ -115,13 +118,14 @@ impl Peaks {
     /// Peaks of squares with so many cells on a side, and `more` cells of the next ones.
     pub fn new(field: &HeightField<'_>, side: usize, more: usize) -> Result<Self, Error> {
         let [width, height] = field.size();
-        let columns = width.div_ceil(side);
+        // No power of two from row to row, which would crowd few sets of a cache.
+        let columns = width.div_ceil(side) | 1;
         let rows = height.div_ceil(side);
         let mut peaks = memory::filled("peaks", columns * rows, f64::NEG_INFINITY)?;
         for (row, heights) in field.heights().chunks_exact(width).enumerate() {
             for square in row.saturating_sub(more) / side..=row / side {
                 let peaks = &mut peaks[square * columns..][..columns];
-                for (index, peak) in peaks.iter_mut().enumerate() {
+                for (index, peak) in peaks.iter_mut().take(width.div_ceil(side)).enumerate() {
                     let heights = &heights[index * side..width.min((index + 1) * side + more)];
                     // NaN does not count.
                     *peak = heights.iter().fold(*peak, |peak, &height| peak.max(height));
@@ -173,6 +177,8 @@ struct Stretch {
 
 /// All crossings in an azimuth, from near to far.
 struct Way {
+    /// Whether lines pass more rows than columns.
+    is_steep: bool,
     crossings: Vec<Crossing>,
     /// Stretches of 8 cells, of 64 and of 512.
     stretches: [Vec<Stretch>; 3],
@@ -184,7 +190,9 @@ impl Way {
         let small = Self::small(&crossings);
         let middle = Self::larger(&small, SIDES[1] / SIDES[0]);
         let large = Self::larger(&middle, SIDES[2] / SIDES[1]);
+        let [columns, rows] = march.field.step(azimuth);
         Self {
+            is_steep: rows.abs() > columns.abs(),
             crossings,
             stretches: [small, middle, large],
         }
@@ -237,7 +245,7 @@ impl Way {
     }
 }
 
-/// Rows of squares, which are walked from one after the other.
+/// Rows of tiles, whose squares are walked from one after the other.
 struct Band<'a, Of> {
     march: &'a March<'a>,
     way: &'a Way,
@@ -251,42 +259,61 @@ impl<Of: Fn(f64) -> f32> WithSimd<SIDE> for Band<'_, Of> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<S: Simd + Width<SIDE>>(self, _: S) {
-        let field = self.march.field;
-        let [width, height] = field.size();
+    fn with_simd<S: Simd + Width<SIDE>>(mut self, _: S) {
+        let [width, _] = self.march.field.size();
+        let rows = (self.found.len() / width).div_ceil(SIDE);
         let mut hint = 0;
-        for column in (0..width).step_by(SIDE) {
-            let mut square = Square {
-                march: self.march,
-                way: self.way,
-                column,
-                row: self.row,
-                eyes: [[f64::NAN; SIDE]; SIDE],
-                most: [[f64::NEG_INFINITY; SIDE]; SIDE],
-                hint,
-            };
-            let columns = SIDE.min(width - column);
-            let rows = SIDE.min(height - self.row);
-            for row in 0..rows {
-                let heights = &field.heights()[(self.row + row) * width + column..][..columns];
-                for (eye, height) in square.eyes[row].iter_mut().zip(heights) {
-                    *eye = height + self.march.rise;
-                }
+        for first in (0..width).step_by(TILE) {
+            let columns = TILE.min(width - first).div_ceil(SIDE);
+            for index in 0..columns * rows {
+                // Along the lines, as far as squares go.
+                let [column, row] = match self.way.is_steep {
+                    true => [index / rows, index % rows],
+                    false => [index % columns, index / columns],
+                };
+                hint = self.square([first + SIDE * column, SIDE * row], hint);
             }
-            if self.march.rise < 0.0 {
-                square.most = [[f64::INFINITY; SIDE]; SIDE];
-            } else {
-                square.all();
+        }
+    }
+}
+
+impl<Of: Fn(f64) -> f32> Band<'_, Of> {
+    /// Walks from the square of this column, and of this row of the band.
+    #[inline(always)]
+    fn square(&mut self, [column, first]: [usize; 2], hint: usize) -> usize {
+        let field = self.march.field;
+        let [width, _] = field.size();
+        let mut square = Square {
+            march: self.march,
+            way: self.way,
+            column,
+            row: self.row + first,
+            eyes: [[f64::NAN; SIDE]; SIDE],
+            most: [[f64::NEG_INFINITY; SIDE]; SIDE],
+            hint,
+        };
+        let columns = SIDE.min(width - column);
+        let rows = SIDE.min(self.found.len() / width - first);
+        for row in 0..rows {
+            let heights = &field.heights()[(square.row + row) * width + column..][..columns];
+            for (eye, height) in square.eyes[row].iter_mut().zip(heights) {
+                *eye = height + self.march.rise;
             }
-            hint = square.hint;
-            for row in 0..rows {
-                for lane in 0..columns {
-                    if !square.eyes[row][lane].is_nan() {
-                        self.found[row * width + column + lane] = (self.of)(square.most[row][lane]);
-                    }
+        }
+        if self.march.rise < 0.0 {
+            square.most = [[f64::INFINITY; SIDE]; SIDE];
+        } else {
+            square.all();
+        }
+        for row in 0..rows {
+            for lane in 0..columns {
+                if !square.eyes[row][lane].is_nan() {
+                    self.found[(first + row) * width + column + lane] =
+                        (self.of)(square.most[row][lane]);
                 }
             }
         }
+        square.hint
     }
 }
 
@@ -373,9 +400,7 @@ impl Square<'_> {
             let before = self.most[row];
             match is_whole && !field.has_holes() {
                 true => self.cross_all(row, crossings),
-                false => crossings
-                    .iter()
-                    .for_each(|crossing| self.cross(row, crossing)),
+                false => self.cross_some(row, crossings),
             }
             if before != self.most[row] {
                 self.hint = index;
@@ -386,19 +411,12 @@ impl Square<'_> {
     /// Takes crossings for the cells of a row, none of which leads out of the raster or beside a hole.
     #[inline(always)]
     fn cross_all(&mut self, row: usize, crossings: &[Crossing]) {
-        let heights = self.march.field.heights();
-        let first = (self.row + row) * self.march.field.size()[0] + self.column;
-        let (eyes, mut most) = (self.eyes[row], self.most[row]);
+        let mut most = self.most[row];
         for crossing in crossings {
-            let [a, b] = crossing.offsets.map(|offset| {
-                let first = first.wrapping_add_signed(offset);
-                &heights[first..first + SIDE]
-            });
-            let lower = self.march.drop * crossing.distance;
+            let slopes = self.slopes(row, crossing);
             for lane in 0..SIDE {
-                let slope = crossing.slope([a[lane], b[lane]], eyes[lane]) - lower;
-                most[lane] = if slope > most[lane] {
-                    slope
+                most[lane] = if slopes[lane] > most[lane] {
+                    slopes[lane]
                 } else {
                     most[lane]
                 };
@@ -407,8 +425,94 @@ impl Square<'_> {
         self.most[row] = most;
     }
 
+    /// Slopes to a crossing from the cells of a row, none of which leads out of the raster; NaN where an end has no data.
+    #[inline(always)]
+    fn slopes(&self, row: usize, crossing: &Crossing) -> [f64; SIDE] {
+        let heights = self.march.field.heights();
+        let first = (self.row + row) * self.march.field.size()[0] + self.column;
+        let [a, b] = crossing.offsets.map(|offset| {
+            let first = first.wrapping_add_signed(offset);
+            &heights[first..first + SIDE]
+        });
+        let lower = self.march.drop * crossing.distance;
+        let mut slopes = [0.0; SIDE];
+        for lane in 0..SIDE {
+            slopes[lane] = crossing.slope([a[lane], b[lane]], self.eyes[row][lane]) - lower;
+        }
+        slopes
+    }
+
+    /// Takes crossings for the cells of a row that have such edges.
+    #[inline(always)]
+    fn cross_some(&mut self, row: usize, crossings: &[Crossing]) {
+        for crossing in crossings {
+            self.cross(row, crossing);
+        }
+    }
+
     /// Takes a crossing for the cells of a row that have such an edge.
+    #[inline(always)]
     fn cross(&mut self, row: usize, crossing: &Crossing) {
+        let size = self.march.field.size().map(|size| size as isize);
+        let first = [self.column, self.row + row].map(|at| at as isize);
+        let side = SIDE as isize;
+        let (mut is_beside, mut is_whole) = (false, true);
+        for end in crossing.ends {
+            let [column, row] = [first[0] + end[0], first[1] + end[1]];
+            is_beside |= column <= -side || column >= size[0] || row < 0 || row >= size[1];
+            is_whole &= column >= 0 && column + side <= size[0];
+        }
+        if is_beside {
+            return;
+        }
+        let mut rises = !is_whole;
+        if is_whole {
+            let slopes = self.slopes(row, crossing);
+            let (is_edge, is_known) = self.are_edges(row, crossing);
+            let mut most = self.most[row];
+            for lane in 0..SIDE {
+                let is_higher = is_edge[lane] & (slopes[lane] > most[lane]);
+                most[lane] = if is_higher { slopes[lane] } else { most[lane] };
+                rises |= is_higher;
+            }
+            if is_known {
+                self.most[row] = most;
+                return;
+            }
+        }
+        if rises {
+            self.cross_each(row, crossing);
+        }
+    }
+
+    /// Whether a triangle has the crossed edges with data, and whether this is known: neighbours may be wires, and corners alone.
+    #[inline(always)]
+    fn are_edges(&self, row: usize, crossing: &Crossing) -> ([bool; SIDE], bool) {
+        let (field, mut are) = (self.march.field, [true; SIDE]);
+        let ([[a, b], [c, d]], width) = (crossing.ends, field.size()[0]);
+        if !field.has_holes() {
+            return (are, true);
+        }
+        if a == c || b == d {
+            return (are, (a != c || b != d) && field.wires().is_empty());
+        }
+        // The other corners of the square.
+        let first = (self.row + row) * width + self.column;
+        let [left, right] = [[a, d], [c, b]].map(|[column, row]| {
+            let first = first.wrapping_add_signed(row * width as isize + column);
+            &field.heights()[first..first + SIDE]
+        });
+        let is_main = (a < c) == (b < d);
+        for lane in 0..SIDE {
+            let [left, right] = [!left[lane].is_nan(), !right[lane].is_nan()];
+            are[lane] = if is_main { left | right } else { left != right };
+        }
+        (are, true)
+    }
+
+    /// Takes a crossing for the cells of a row one after the other.
+    #[inline(never)]
+    fn cross_each(&mut self, row: usize, crossing: &Crossing) {
         let field = self.march.field;
         let first = [self.column, self.row + row].map(|at| at as isize);
         for lane in 0..SIDE {

@@ -1,8 +1,9 @@
 //! Height fields: what the cells of a raster of heights see. The class `HeightField` of the package reads its arguments.
 
 use antumbra_bake::{
-    Direction, Error, FieldHorizonJob, FieldSunJob, HeightField, Lattice, Limits, Observer,
-    Orientation, Place, SkyPatches, SunPosition, Sunlight, Suns, UpAxis, ones,
+    Direction, Error, FieldHorizonJob, FieldSky, FieldSunJob, HeightField, Lattice, Limits,
+    Observer, Orientation, Place, SkyMeasure, SkyPatches, SunPosition, Sunlight, Suns, UpAxis,
+    ones,
 };
 use antumbra_terrain::angles::slope;
 use antumbra_terrain::{Progress, Shadows, Share, Viewer, memory};
@@ -30,6 +31,23 @@ enum Azimuths {
     /// A lattice of so many.
     Lattice(usize),
     Degrees(Vec<f64>),
+}
+
+impl Azimuths {
+    /// The azimuths, and the directions of a field.
+    fn of(self, field: &HeightField<'_>) -> Result<(Vec<f64>, Vec<Direction>), Error> {
+        Ok(match self {
+            Self::Lattice(count) => {
+                let Lattice { steps, azimuths } = Lattice::new(field, count)?;
+                (azimuths, steps.into_iter().map(Direction::Step).collect())
+            }
+            Self::Degrees(azimuths) => {
+                let direction = |&azimuth: &f64| Direction::new(field, azimuth);
+                let directions = azimuths.iter().map(direction).collect();
+                (azimuths, directions)
+            }
+        })
+    }
 }
 
 /// Heights of cells, as ``HeightField`` has them: float64 in C order, which nobody changes.
@@ -128,17 +146,7 @@ impl Field {
         options: Options<'py>,
     ) -> Answer<'py, f32, Vec<f64>> {
         self.ask(py, options, |field, signals| {
-            let (azimuths, directions): (_, Vec<_>) = match azimuths {
-                Azimuths::Lattice(count) => {
-                    let Lattice { steps, azimuths } = Lattice::new(field, count)?;
-                    (azimuths, steps.into_iter().map(Direction::Step).collect())
-                }
-                Azimuths::Degrees(azimuths) => {
-                    let direction = |&azimuth: &f64| Direction::new(field, azimuth);
-                    let directions = azimuths.iter().map(direction).collect();
-                    (azimuths, directions)
-                }
-            };
+            let (azimuths, directions) = azimuths.of(field)?;
             let (parts, cells) = (directions.len(), field.heights().len());
             let mut angles = memory::room("angles", parts.saturating_mul(cells))?;
             let job = FieldHorizonJob::new(field, &directions, rise, drop)?;
@@ -146,6 +154,29 @@ impl Field {
                 angles.extend(job.plane(index, &Share(signals, [index, parts]))?);
             }
             Ok((angles, azimuths))
+        })
+    }
+
+    /// A measure of the sky, by its number among all, and mean and greatest difference from half of the azimuths.
+    fn sky<'py>(
+        &self,
+        py: Python<'py>,
+        measure: usize,
+        azimuths: Azimuths,
+        rise: f64,
+        options: Options<'py>,
+    ) -> Answer<'py, f32, Option<[f64; 2]>> {
+        let all = [SkyMeasure::View, SkyMeasure::Open, SkyMeasure::Openness];
+        self.ask(py, options, |field, signals| {
+            let (_, directions) = azimuths.of(field)?;
+            let job = FieldHorizonJob::new(field, &directions, rise, 0.0)?;
+            let mut sky = FieldSky::new(field, &directions, all[measure % 3])?;
+            for index in 0..directions.len() {
+                let share = Share(signals, [index, directions.len()]);
+                sky.add(index, &job.plane(index, &share)?);
+            }
+            let found = sky.finish();
+            Ok((found.values, found.quadrature_error))
         })
     }
 

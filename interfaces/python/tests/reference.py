@@ -19,7 +19,7 @@ PAGE = pathlib.Path(__file__).parents[3] / "docs" / "src" / "python" / "referenc
 PARTS = [
     ("Scenes", antumbra, ["Scene", "World", "Queries", "Mesh", "Curves", "Instance", "Assembly", "ChildOrder"]),
     ("Height fields", antumbra, ["HeightField"]),
-    ("Results", antumbra, ["Hits", "HitList", "Closest", "Occluders", "BitMatrix", "SunPositions", "Irradiation", "Horizons", "Map", "Picture"]),
+    ("Results", antumbra, ["Hits", "HitList", "Closest", "Occluders", "BitMatrix", "SunPositions", "Irradiation", "Horizons", "Sky", "Map", "Picture"]),
     ("Functions", antumbra, ["sun_positions", "irradiation", "sky_patches", "texel_atlas", "heat_map", "render", "set_threads", "get_threads"]),
     ("Warnings", antumbra, ["DegenerateWarning"]),
     ("antumbra.trimesh", antumbra.trimesh, ["RayMeshIntersector", "install"]),

@@ -111,6 +111,31 @@ def test_horizons_equal_brute_force(transform, holes):
             np.testing.assert_allclose([angles[cell] for cell in cells(z)], wanted, atol=1e-4)
 
 
+def test_sky_is_what_horizons_leave():
+    z = rough(holes=0.1)
+    field = am.HeightField(z, 2.0)
+    azimuths, angles = field.horizons()
+    gaps = np.diff(np.append(azimuths, 360.0))
+    weights = (gaps + np.roll(gaps, 1)) / 720
+    level = np.where(angles == -90, 0, angles)
+    wanted = np.einsum("a,aij->ij", weights, 90 - level)
+    found = field.sky("openness")
+    np.testing.assert_allclose(found.values, wanted, atol=1e-4)
+    assert found.values.dtype == np.float32 and 0 < found.quadrature_error[0] < found.quadrature_error[1]
+    assert field.sky("openness", [90.0]).quadrature_error is None
+    # A slope sees (1 + cos s) / 2 of the light of the sky, and 1 - s / 180 of the sky.
+    for slope in [0.0, 30.0, 60.0]:
+        plane = np.tan(np.radians(slope)) * np.mgrid[0:9, 0:9][0]
+        for order in [slice(None), slice(None, None, -1)]:
+            tilted = am.HeightField(plane[order])
+            np.testing.assert_allclose(tilted.sky(azimuths="lattice:48").values, (1 + np.cos(np.radians(slope))) / 2, atol=2e-3)
+            np.testing.assert_allclose(tilted.sky("sky-open", np.arange(0, 360, 5)).values, 1 - slope / 180, atol=2e-3)
+    with pytest.raises(ValueError, match="show: found 'view', wanted 'sky-view'"):
+        field.sky("view")
+    with pytest.raises(ValueError, match="directions: found 0, wanted at least 1"):
+        field.sky(azimuths=[])
+
+
 @pytest.mark.parametrize("transform", TRANSFORMS.values(), ids=TRANSFORMS)
 @pytest.mark.parametrize("holes", [0.0, 0.2])
 def test_light_and_hours_equal_brute_force(transform, holes):

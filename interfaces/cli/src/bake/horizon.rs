@@ -80,10 +80,11 @@ pub struct HorizonArgs {
     pub output: Vec<PathBuf>,
     /// What to write: angles, or the sky that they leave open
     ///
-    /// All but angles are for --cells of a height raster, and one number for each cell: a sum over its horizons, which stand for the parts
-    /// of the circle around them. The sky ends at the horizontal. The end of the run says how much values would change with half
+    /// angles are degrees for each azimuth. All others are for --cells of a height raster, and one number for each cell, a sum over its
+    /// horizons: sky-view is the part of the light of an even sky that the surface of the cell receives, sky-open the part of the
+    /// hemisphere above that nothing hides, and openness degrees from the zenith down to the horizon. The sky ends at the horizontal. The end of the run says how much values would change with half
     /// of the azimuths, which bounds their error from above in practice.
-    #[arg(long, value_name = "WHAT", value_enum, default_value_t = Shown::Angles, help_heading = heading::OUTPUT)]
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = Shown::Angles, hide_possible_values = true, help_heading = heading::OUTPUT)]
     pub show: Shown,
     #[command(flatten)]
     pub raster: RasterArgs,
@@ -375,10 +376,7 @@ impl Horizon<'_> {
         let progress = Progress::new(self.name);
         let mut sky = sums()?;
         for index in 0..count {
-            sky.add(
-                index,
-                &job.plane(index, &Share(&progress, [index, count]))?,
-            );
+            sky.add(index, &job.plane(index, &Share(&progress, [index, count]))?);
         }
         progress.finish();
         Ok(Done::whole(sky.finish(), start.elapsed().as_secs_f64()))

@@ -34,7 +34,7 @@ from ._core import (
     texel_atlas,
 )
 from ._sun import Irradiation, SunPositions, irradiation, sun_positions
-from ._terrain import HeightField, Horizons
+from ._terrain import HeightField, Horizons, Sky
 
 
 class Mesh(NamedTuple):
@@ -192,6 +192,7 @@ __all__ = [
     "Picture",
     "Queries",
     "Scene",
+    "Sky",
     "SunPositions",
     "World",
     "__version__",

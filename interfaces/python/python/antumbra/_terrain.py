@@ -15,6 +15,7 @@ from ._sun import SunPositions
 
 REFRACTION = 0.13
 EARTH_RADIUS = 6_371_008.8
+SHOWN = ["sky-view", "sky-open", "openness"]
 
 
 class Horizons(NamedTuple):
@@ -32,6 +33,23 @@ class Horizons(NamedTuple):
     """Degrees from the north of the map (y) through east: (n,)."""
     angles: NDArray[np.float32]
     """Elevations of the horizon in degrees: (n, rows, columns). -90 where no surface is ahead, NaN without data."""
+
+
+class Sky(NamedTuple):
+    """How much of the sky each cell sees, from ``HeightField.sky``.
+
+    Examples
+    --------
+    >>> import antumbra as am
+    >>> am.HeightField([[0, 0], [0, 0]]).sky().values
+    array([[1., 1.],
+           [1., 1.]], dtype=float32)
+    """
+
+    values: NDArray[np.float32]
+    """The measure of each cell: (rows, columns). NaN without data."""
+    quadrature_error: tuple[float, float] | None
+    """Mean and greatest difference from the values of half as many azimuths; None if there are too few. The error left is mostly smaller."""
 
 
 class HeightField:
@@ -159,6 +177,63 @@ class HeightField:
         drop = _drop(curvature, refraction, earth_radius)
         angles, found = self._field.horizons(_azimuths(azimuths), _from_zero("rise", rise), drop, (threads, progress))
         return Horizons(np.array(found), self._shaped(angles, len(found)))
+
+    def sky(
+        self,
+        show: str = "sky-view",
+        azimuths: str | ArrayLike = "lattice:16",
+        *,
+        rise: float = 0.0,
+        threads: int | None = None,
+        progress: Any = None,
+    ) -> Sky:
+        """How much of the sky each cell sees, summed over its horizons: what ``antumbra horizon --cells --show`` computes.
+
+        The sky ends at the horizontal. Where no surface is ahead, as at the border, the horizon is level.
+
+        Parameters
+        ----------
+        show : str
+            ``"sky-view"``: part of the light of an even sky that the surface of the cell receives, ``(1 + cos s) / 2`` for a slope s
+            without a horizon (Dozier and Frew 1990). ``"sky-open"``: part of the hemisphere above that neither the horizon nor the
+            surface of the cell hides. ``"openness"``: degrees from the zenith down to the horizon, on average, also below the
+            horizontal (Yokoyama, Shirasawa and Pike 2002).
+        azimuths : str or array (n,)
+            As for ``horizons``, at least one. Each stands for the part of the circle halfway to its neighbours.
+        rise : float
+            Height of eyes above their cells, from 0.
+        threads : int, optional
+            Number of threads; see ``set_threads``.
+        progress : optional
+            Function of ``(done, total)``, or an object with ``update(n)``, as tqdm's bars have.
+
+        Returns
+        -------
+        Sky
+            ``values``, float32 of shape (rows, columns), NaN without data and, but for the openness, for cells without a triangle; and
+            ``quadrature_error``.
+
+        Raises
+        ------
+        ValueError, TypeError
+            An argument is outside its range, or has another shape or type.
+        MemoryError
+            There is no memory for the values.
+
+        Examples
+        --------
+        A court inside walls, whose middle sees more than its edge:
+
+        >>> import numpy as np, antumbra as am
+        >>> heights = np.pad(np.zeros((5, 5)), 1, constant_values=2.0)
+        >>> values, error = am.HeightField(heights).sky()
+        >>> values[3, 3] > values[1, 3], error is not None
+        (True, True)
+        """
+        if show not in SHOWN:
+            raise ValueError(f"show: found {show!r}, wanted 'sky-view', 'sky-open' or 'openness'")
+        found, error = self._field.sky(SHOWN.index(show), _azimuths(azimuths), _from_zero("rise", rise), (threads, progress))
+        return Sky(self._shaped(found), error if error is None else tuple(error))
 
     def lit(
         self,

@@ -92,6 +92,38 @@ class Terrain:
         coords = {"azimuth": ("azimuth", found, north)}
         return self._made(angles, "horizon", "degrees", "elevation of the horizon", ("azimuth",), coords)
 
+    def sky(self, show: str = "sky-view", azimuths: str | ArrayLike = "lattice:16", **options: Any) -> Any:
+        """How much of the sky each cell sees.
+
+        Parameters
+        ----------
+        show, azimuths, options
+            As for ``HeightField.sky``.
+
+        Returns
+        -------
+        xarray.DataArray
+            float32 of dimensions (y, x), with the attribute ``quadrature_error``.
+
+        Raises
+        ------
+        ValueError, TypeError
+            As ``HeightField.sky``.
+
+        Examples
+        --------
+        >>> import xarray
+        >>> import antumbra.xarray
+        >>> heights = xarray.DataArray([[0, 0], [0, 0]], dims=("y", "x"), coords={"y": [1, 0], "x": [0, 1]})
+        >>> heights.antumbra.sky("openness").values
+        array([[90., 90.],
+               [90., 90.]], dtype=float32)
+        """
+        values, error = self.field.sky(show, azimuths, **options)
+        unit = "degrees" if show == "openness" else "1"
+        made = self._made(values, show.replace("-", "_"), unit, "sky above the cell by its horizons")
+        return made if error is None else made.assign_attrs(quadrature_error=error)
+
     def lit(self, azimuth: Any, elevation: Any, **options: Any) -> Any:
         """Which cells get light from far away.
 

@@ -99,7 +99,7 @@ pub struct SunArgs {
     pub json: Option<Destination>,
     #[command(flatten)]
     pub places: PlaceArgs,
-    /// Height raster around the scene, which casts shadows
+    /// Heights around the scene, which cast shadows
     ///
     /// Hills hide the sun and the sky as the scene does, without a mesh of them. Several files, a folder or a .vrt, after the scene and
     /// in its coordinates. Its coordinate system gives place, unit and north, unless flags do. With --cells, sensors are its cells, on which
