@@ -485,7 +485,7 @@ impl Square<'_> {
         }
     }
 
-    /// Whether a triangle has the crossed edges with data, and whether this is known: neighbours may be wires, and corners alone.
+    /// Whether a triangle has the crossed edges with data, and whether this is known: neighbours may be wires, and corners by themselves.
     #[inline(always)]
     fn are_edges(&self, row: usize, crossing: &Crossing) -> ([bool; SIDE], bool) {
         let (field, mut are) = (self.march.field, [true; SIDE]);

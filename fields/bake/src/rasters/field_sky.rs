@@ -178,13 +178,26 @@ impl Part<'_> {
     /// Adds what `of` makes of the horizon in degrees and of the rise of the surface.
     #[inline(always)]
     fn add(self, of: impl Fn(f32, f64) -> f64) {
-        let Self { way, .. } = self;
-        let (sums, cells) = (self.sums.0.iter_mut().zip(self.sums.1), self.cells);
-        for ((sum, fewer), (&horizon, rise)) in sums.zip(cells.0.iter().zip(cells.1)) {
-            let rise = f64::from(rise[0]) * way.east + f64::from(rise[1]) * way.north;
-            let part = of(horizon, rise);
-            *sum += way.weight * part;
-            *fewer += way.fewer * part as f32;
+        /// Cells at a time, in lists of a known length, which compilers make vectors of.
+        const LANES: usize = 64;
+        let (way, (horizons, rises)) = (self.way, self.cells);
+        let (mut high, mut rise, mut part) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        for first in (0..horizons.len()).step_by(LANES) {
+            let cells = first..(first + LANES).min(horizons.len());
+            for (lane, cell) in cells.clone().enumerate() {
+                let [east, north] = rises[cell];
+                high[lane] = horizons[cell];
+                rise[lane] = f64::from(east) * way.east + f64::from(north) * way.north;
+            }
+            for lane in 0..LANES {
+                part[lane] = of(high[lane], rise[lane]);
+            }
+            let sums = self.sums.0[cells.clone()].iter_mut();
+            let sums = sums.zip(&mut self.sums.1[cells]);
+            for ((sum, fewer), part) in sums.zip(part) {
+                *sum += way.weight * part;
+                *fewer += way.fewer * part as f32;
+            }
         }
     }
 }

@@ -227,7 +227,7 @@ class HeightField:
         >>> import numpy as np, antumbra as am
         >>> heights = np.pad(np.zeros((5, 5)), 1, constant_values=2.0)
         >>> values, error = am.HeightField(heights).sky()
-        >>> values[3, 3] > values[1, 3], error is not None
+        >>> bool(values[3, 3] > values[1, 3]), error is not None
         (True, True)
         """
         if show not in SHOWN:
