@@ -175,13 +175,15 @@ impl WithSimd<8> for Part<'_> {
 }
 
 impl Part<'_> {
-    /// Adds what `of` makes of the horizon in degrees and of the rise of the surface.
+    /// Adds what `of` makes of the horizon in degrees, of the rise of the surface, and of the greater one of their elevations and 0 in
+    /// radians.
     #[inline(always)]
-    fn add(self, of: impl Fn(f32, f64) -> f64) {
+    fn add(self, of: impl Fn(f32, f64, f64) -> f64) {
         /// Cells at a time, in lists of a known length, which compilers make vectors of.
         const LANES: usize = 64;
         let (way, (horizons, rises)) = (self.way, self.cells);
-        let (mut high, mut rise, mut part) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let (mut high, mut plane) = ([0.0; LANES], [0.0; LANES]);
+        let (mut rise, mut above, mut part) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for first in (0..horizons.len()).step_by(LANES) {
             let cells = first..(first + LANES).min(horizons.len());
             for (lane, cell) in cells.clone().enumerate() {
@@ -189,8 +191,20 @@ impl Part<'_> {
                 high[lane] = horizons[cell];
                 rise[lane] = f64::from(east) * way.east + f64::from(north) * way.north;
             }
+            // Each loop on its own, since none of them branches then.
             for lane in 0..LANES {
-                part[lane] = of(high[lane], rise[lane]);
+                plane[lane] = degrees(rise[lane]);
+            }
+            for lane in 0..LANES {
+                let own = if plane[lane] > high[lane] {
+                    plane[lane]
+                } else {
+                    high[lane]
+                };
+                above[lane] = f64::from(if own < 0.0 { 0.0 } else { own }).to_radians();
+            }
+            for lane in 0..LANES {
+                part[lane] = of(high[lane], rise[lane], above[lane]);
             }
             let sums = self.sums.0[cells.clone()].iter_mut();
             let sums = sums.zip(&mut self.sums.1[cells]);
@@ -204,27 +218,27 @@ impl Part<'_> {
 
 /// Part of [`SkyMeasure::View`] in a direction, for a normal whose vertical part is 1.
 #[inline(always)]
-fn view(horizon: f32, rise: f64) -> f64 {
-    let [angle, sin, cos] = above(horizon, rise);
+fn view(_: f32, rise: f64, angle: f64) -> f64 {
+    let [sin, cos] = sin_cos(angle);
     cos * cos - rise * (std::f64::consts::FRAC_PI_2 - angle - sin * cos)
 }
 
 /// Part of [`SkyMeasure::Open`] in a direction.
 #[inline(always)]
-fn open(horizon: f32, rise: f64) -> f64 {
-    1.0 - above(horizon, rise)[1]
+fn open(_: f32, rise: f64, angle: f64) -> f64 {
+    // Not known without a triangle, where the rise is NaN.
+    1.0 - sin_cos(angle)[0] + 0.0 * rise
 }
 
 /// Part of [`SkyMeasure::Openness`] in a direction.
 #[inline(always)]
-fn openness(horizon: f32, _: f64) -> f64 {
+fn openness(horizon: f32, _: f64, _: f64) -> f64 {
     90.0 - f64::from(if horizon == -90.0 { 0.0 } else { horizon })
 }
 
-/// The greater one of the elevations of a horizon in degrees, of a rise, and 0: in radians, its sine and its cosine.
+/// Sine and cosine of an angle from 0 to 90 degrees.
 #[inline(always)]
-fn above(horizon: f32, rise: f64) -> [f64; 3] {
-    let angle = f64::from(horizon.max(degrees(rise)).max(0.0)).to_radians();
+fn sin_cos(angle: f64) -> [f64; 2] {
     // Terms up to the 21st power are right to 1e-16, in vectors.
     let square = angle * angle;
     let mut series = 1.0;
@@ -233,7 +247,8 @@ fn above(horizon: f32, rise: f64) -> [f64; 3] {
         series = 1.0 - square * (1.0 / next) * series;
     }
     let sin = angle * series;
-    [angle, sin, (1.0 - sin * sin).max(0.0).sqrt()]
+    let square = 1.0 - sin * sin;
+    [sin, (if square > 0.0 { square } else { 0.0 }).sqrt()]
 }
 
 /// Directions with the parts of the circle that they stand for: half of the way to both neighbours.
