@@ -60,16 +60,33 @@ impl Lattice {
         Ok(Self { steps, azimuths })
     }
 
-    /// Part of the circle that each azimuth stands for: half of the way to both neighbours. The sum is 1.
+    /// Part of the circle that each azimuth stands for: see [`weights`].
     pub fn weights(&self) -> Vec<f64> {
-        let count = self.azimuths.len();
-        let at = |index: usize| self.azimuths[index % count];
-        let weight = |index: usize| {
-            let ahead = (at(index + 1) - at(index + count - 1)).rem_euclid(360.0);
-            ahead / 720.0
-        };
-        (0..count).map(weight).collect()
+        weights(&self.azimuths)
     }
+}
+
+/// Part of the circle that each of some azimuths in degrees stands for, in any order: half of the way to both neighbours. The sum is 1.
+///
+/// ```
+/// assert_eq!(antumbra_terrain::weights(&[0.0, 270.0, 90.0]), [0.25, 0.375, 0.375]);
+/// ```
+pub fn weights(azimuths: &[f64]) -> Vec<f64> {
+    let turned = |index: usize| azimuths[index].rem_euclid(360.0);
+    let mut order: Vec<usize> = (0..azimuths.len()).collect();
+    order.sort_by(|&a, &b| turned(a).total_cmp(&turned(b)));
+    let mut weights = vec![0.0; azimuths.len()];
+    for (place, &index) in order.iter().enumerate() {
+        let next = order[(place + 1) % order.len()];
+        let gap = match (turned(next) - turned(index)).rem_euclid(360.0) {
+            // The only one has the whole circle.
+            _ if order.len() == 1 => 360.0,
+            gap => gap,
+        };
+        weights[index] += gap / 720.0;
+        weights[next] += gap / 720.0;
+    }
+    weights
 }
 
 /// A direction in which horizons are wanted.

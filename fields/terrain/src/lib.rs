@@ -58,7 +58,7 @@ mod viewshed;
 pub use angles::degrees;
 pub use error::Error;
 pub use height_field::{HeightField, Observer};
-pub use lattice::{Direction, Lattice};
+pub use lattice::{Direction, Lattice, weights};
 pub use march::March;
 pub use monitor::Monitor;
 #[doc(hidden)]

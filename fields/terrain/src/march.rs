@@ -398,9 +398,13 @@ impl Square<'_> {
         let crossings = &self.way.crossings[stretch.parts.clone()];
         for row in (0..SIDE).filter(|&row| rows[row]) {
             let before = self.most[row];
-            match is_whole && !field.has_holes() {
-                true => self.cross_all(row, crossings),
-                false => self.cross_some(row, crossings),
+            if is_whole && !field.has_holes() {
+                self.cross_all(row, crossings);
+            } else {
+                // No closure, which would not be compiled for the CPU's vectors.
+                for crossing in crossings {
+                    self.cross(row, crossing);
+                }
             }
             if before != self.most[row] {
                 self.hint = index;
@@ -440,14 +444,6 @@ impl Square<'_> {
             slopes[lane] = crossing.slope([a[lane], b[lane]], self.eyes[row][lane]) - lower;
         }
         slopes
-    }
-
-    /// Takes crossings for the cells of a row that have such edges.
-    #[inline(always)]
-    fn cross_some(&mut self, row: usize, crossings: &[Crossing]) {
-        for crossing in crossings {
-            self.cross(row, crossing);
-        }
     }
 
     /// Takes a crossing for the cells of a row that have such an edge.

@@ -1,9 +1,8 @@
 //! Height fields: what the cells of a raster of heights see. The class `HeightField` of the package reads its arguments.
 
 use antumbra_bake::{
-    Direction, Error, FieldHorizonJob, FieldSky, FieldSunJob, HeightField, Lattice, Limits,
-    Observer, Orientation, Place, SkyMeasure, SkyPatches, SunPosition, Sunlight, Suns, UpAxis,
-    ones,
+    Direction, Error, FieldHorizonJob, FieldSunJob, HeightField, Lattice, Limits, Observer,
+    Orientation, Place, SkyMeasure, SkyPatches, SunPosition, Sunlight, Suns, UpAxis, ones,
 };
 use antumbra_terrain::angles::slope;
 use antumbra_terrain::{Progress, Shadows, Share, Viewer, memory};
@@ -157,7 +156,7 @@ impl Field {
         })
     }
 
-    /// A measure of the sky, by its number among all, and mean and greatest difference from half of the azimuths.
+    /// A measure of the sky, by its number among all, and mean and greatest difference from coarser azimuths.
     fn sky<'py>(
         &self,
         py: Python<'py>,
@@ -170,12 +169,7 @@ impl Field {
         self.ask(py, options, |field, signals| {
             let (_, directions) = azimuths.of(field)?;
             let job = FieldHorizonJob::new(field, &directions, rise, 0.0)?;
-            let mut sky = FieldSky::new(field, &directions, all[measure % 3])?;
-            for index in 0..directions.len() {
-                let share = Share(signals, [index, directions.len()]);
-                sky.add(index, &job.plane(index, &share)?);
-            }
-            let found = sky.finish();
+            let found = job.sky(all[measure % 3], signals)?;
             Ok((found.values, found.quadrature_error))
         })
     }

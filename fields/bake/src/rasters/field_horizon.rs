@@ -3,9 +3,9 @@
 use std::ops::Range;
 
 use antumbra::Bvh;
-use antumbra_terrain::{Direction, HeightField, March, Sweep, degrees};
+use antumbra_terrain::{Direction, HeightField, March, Share, Sweep, degrees};
 
-use crate::{Answers, Error, Job, Key, Monitor, Size};
+use crate::{Answers, Error, FieldSky, Job, Key, Monitor, Size, SkyMeasure, SkyValues};
 
 /// Job of the horizons of a height field: the elevation of the highest surface in degrees, `[directions, cells]`, as
 /// [`Sweep::horizons`] and [`March::horizons`] say. Cells without data have NaN.
@@ -48,6 +48,35 @@ impl<'a> FieldHorizonJob<'a> {
             Direction::Step(step) => self.sweep.horizons(step, degrees, monitor)?,
             Direction::Azimuth(azimuth) => self.march.horizons(azimuth, degrees, monitor)?,
         })
+    }
+
+    /// What of the sky each cell sees, with little memory: one direction at a time.
+    ///
+    /// # Errors
+    /// As of [`FieldHorizonJob::plane`]; [`Error::Range`] if there is no direction.
+    pub fn sky(&self, measure: SkyMeasure, monitor: &dyn Monitor) -> Result<SkyValues, Error> {
+        let count = self.directions.len();
+        let mut sky = FieldSky::new(self.sweep.field, self.directions, measure)?;
+        for index in 0..count {
+            sky.add(index, &self.plane(index, &Share(monitor, [index, count]))?);
+        }
+        Ok(sky.finish())
+    }
+
+    /// [`FieldHorizonJob::sky`] of the angles that [`run`](crate::run) or shards found.
+    ///
+    /// # Errors
+    /// [`Error::NoMemory`]; [`Error::Range`] if there is no direction.
+    ///
+    /// # Panics
+    /// If there are not as many angles as directions and cells.
+    pub fn sky_of(&self, angles: &[f32], measure: SkyMeasure) -> Result<SkyValues, Error> {
+        let mut sky = FieldSky::new(self.sweep.field, self.directions, measure)?;
+        let planes = angles.chunks_exact(self.sweep.field.heights().len());
+        planes
+            .enumerate()
+            .for_each(|(index, plane)| sky.add(index, plane));
+        Ok(sky.finish())
     }
 }
 

@@ -2,7 +2,7 @@
 
 use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
 use antumbra_terrain::angles::sin_cos_degrees;
-use antumbra_terrain::{Direction, HeightField, degrees};
+use antumbra_terrain::{Direction, HeightField, degrees, weights};
 use rayon::prelude::*;
 
 use crate::{Error, memory};
@@ -46,13 +46,13 @@ struct Way {
     fewer: f32,
 }
 
-/// Values of all cells, row by row, and how far they are from values of half as many directions.
+/// Values of all cells, row by row, and how far they are from values of fewer directions.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SkyValues {
     /// The measure; NaN for cells without data, and where it is not known.
     pub values: Vec<f32>,
-    /// Mean and greatest difference from the values of half as many azimuths, in which horizons are half as dense. The error that is left is
-    /// mostly smaller. `None` if there are too few directions.
+    /// Mean and greatest difference from the values of the next coarser lattice, or of every second azimuth. They estimate mean and
+    /// greatest error, but a single cell may be off by more than it differs. `None` if there are too few directions.
     pub quadrature_error: Option<[f64; 2]>,
 }
 
@@ -262,39 +262,26 @@ fn ways(field: &HeightField<'_>, directions: &[Direction]) -> Vec<Way> {
         Direction::Azimuth(azimuth) => sin_cos_degrees(azimuth).into(),
     };
     let units: Vec<[f64; 2]> = directions.iter().map(unit).collect();
-    let kept = fewer(directions);
-    let all = weights(&units, |_| true);
-    let fewer = weights(&units, |index| kept[index]);
-    let ways = units.iter().zip(all.iter().zip(fewer));
-    ways.map(|(&[east, north], (&weight, fewer))| Way {
+    let azimuth = |&[east, north]: &[f64; 2]| libm::atan2(east, north).to_degrees();
+    let azimuths: Vec<f64> = units.iter().map(azimuth).collect();
+    let kept = coarser(directions);
+    let few: Vec<f64> = kept.iter().map(|&index| azimuths[index]).collect();
+    let mut fewer = vec![0.0; units.len()];
+    for (index, weight) in kept.into_iter().zip(weights(&few)) {
+        fewer[index] = weight as f32;
+    }
+    let all = units.iter().zip(weights(&azimuths)).zip(fewer);
+    let way = |((&[east, north], weight), fewer): ((&[f64; 2], f64), f32)| Way {
         east,
         north,
         weight,
-        fewer: fewer as f32,
-    })
-    .collect()
+        fewer,
+    };
+    all.map(way).collect()
 }
 
-/// Parts of the circle of those directions that are kept; 0 for others.
-fn weights(units: &[[f64; 2]], is_kept: impl Fn(usize) -> bool) -> Vec<f64> {
-    let azimuth = |index: usize| libm::atan2(units[index][0], units[index][1]).to_degrees();
-    let mut order: Vec<usize> = (0..units.len()).filter(|&index| is_kept(index)).collect();
-    order.sort_by(|&a, &b| azimuth(a).total_cmp(&azimuth(b)));
-    let mut weights = vec![0.0; units.len()];
-    for (place, &index) in order.iter().enumerate() {
-        let next = order[(place + 1) % order.len()];
-        let gap = match (azimuth(next) - azimuth(index)).rem_euclid(360.0) {
-            0.0 if order.len() == 1 => 360.0,
-            gap => gap,
-        };
-        weights[index] += gap / 720.0;
-        weights[next] += gap / 720.0;
-    }
-    weights
-}
-
-/// Which directions are half as dense: the next coarser lattice, else every second one. All, if there are too few.
-fn fewer(directions: &[Direction]) -> Vec<bool> {
+/// The directions of the next coarser lattice, else every second one. All, if there are too few.
+fn coarser(directions: &[Direction]) -> Vec<usize> {
     let size = |direction: &Direction| match direction {
         Direction::Step(step) => step.iter().map(|steps| steps.abs()).max(),
         Direction::Azimuth(_) => None,
@@ -302,10 +289,10 @@ fn fewer(directions: &[Direction]) -> Vec<bool> {
     let sizes: Option<Vec<i32>> = directions.iter().map(size).collect();
     let sizes = sizes.unwrap_or_default();
     let most = sizes.iter().copied().max().unwrap_or(0);
-    let count = directions.len();
+    let all = 0..directions.len();
     match most > 1 {
-        true => sizes.iter().map(|&size| size < most).collect(),
-        false if count >= 4 && count.is_multiple_of(2) => (0..count).map(|i| i % 2 == 0).collect(),
-        false => vec![true; count],
+        true => all.filter(|&index| sizes[index] < most).collect(),
+        false if all.len() >= 4 && all.len().is_multiple_of(2) => all.step_by(2).collect(),
+        false => all.collect(),
     }
 }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use antumbra::{Aabb, Bvh, Ray};
-use antumbra_terrain::{HeightField, Shadows, per_cell};
+use antumbra_terrain::{HeightField, Shadows, Share, per_cell};
 use rayon::prelude::*;
 
 use crate::sun::sunlight::{Lights, Received, facing};
@@ -134,11 +134,10 @@ impl<'a> FieldSunJob<'a> {
     /// # Errors
     /// [`Error::NoMemory`], [`Error::Cancelled`].
     pub fn whole(&self, keeps: bool, monitor: &dyn Monitor) -> Result<SunFound, Error> {
-        let total = self.directions.len();
-        let batches = self.directions.chunks(BATCH).enumerate();
-        let planes = batches.map(|(batch, directions)| {
-            let monitor = Batch(monitor, [BATCH * batch, total]);
-            self.lit(BATCH * batch..BATCH * batch + directions.len(), &monitor)
+        let (total, batches) = (self.directions.len(), self.directions.len().div_ceil(BATCH));
+        let planes = (0..batches).map(|batch| {
+            let lights = BATCH * batch..total.min(BATCH * (batch + 1));
+            self.lit(lights, &Share(monitor, [batch, batches]))
         });
         self.sums(keeps, planes)
     }
@@ -262,20 +261,6 @@ fn may_hit(bounds: &Aabb, origin: [f32; 3], direction: [f32; 3]) -> bool {
         far = ends[0].max(ends[1]).min(far);
     }
     near <= far * (1.0 + 1e-5)
-}
-
-/// Progress of a batch, before which so many of all directions were done.
-struct Batch<'a>(&'a dyn Monitor, [usize; 2]);
-
-impl Monitor for Batch<'_> {
-    fn progress(&self, done: usize, _: usize) {
-        let [before, total] = self.1;
-        self.0.progress(before + done, total);
-    }
-
-    fn cancelled(&self) -> bool {
-        self.0.cancelled()
-    }
 }
 
 impl Job for FieldSunJob<'_> {

@@ -82,8 +82,7 @@ pub struct HorizonArgs {
     ///
     /// angles are degrees for each azimuth. All others are for --cells of a height raster, and one number for each cell, a sum over its
     /// horizons: sky-view is the part of the light of an even sky that the surface of the cell receives, sky-open the part of the
-    /// hemisphere above that nothing hides, and openness degrees from the zenith down to the horizon. The sky ends at the horizontal. The end of the run says how much values would change with half
-    /// of the azimuths, which bounds their error from above in practice.
+    /// hemisphere above that nothing hides, and openness degrees from the zenith down to the horizon. The sky ends at the horizontal. The end of the run says how much values of the next coarser lattice, or of every second azimuth, differ.
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = Shown::Angles, hide_possible_values = true, help_heading = heading::OUTPUT)]
     pub show: Shown,
     #[command(flatten)]
@@ -272,7 +271,7 @@ fn of_cells(args: &HorizonArgs, bake: &Bake<'_>, mut files: Files) -> Result<(),
     let (done, quadrature_error) = match args.show.measure() {
         None => (bake.compute_cells(&job, &terrain.name)?, None),
         Some(measure) => {
-            let found = horizon.sky(bake, (&field, &directions, measure), &job)?;
+            let found = horizon.sky(bake, (&field, measure), &job)?;
             let quadrature_error = found.found.as_ref().and_then(|sky| sky.quadrature_error);
             (found.map(|sky| Ok(sky.values))?, quadrature_error)
         }
@@ -355,31 +354,22 @@ impl Horizon<'_> {
         self.end(bake, (all, None), &done, || ())
     }
 
-    /// Sums the sky that the horizons of a field leave open: plane by plane, or from the planes of shards.
+    /// What of the sky the cells see: azimuth by azimuth, or from the angles of shards.
     fn sky(
         &self,
         bake: &Bake<'_>,
-        (field, directions, measure): (&HeightField<'_>, &[Direction], SkyMeasure),
+        (field, measure): (&HeightField<'_>, SkyMeasure),
         job: &FieldHorizonJob<'_>,
     ) -> Result<Done<SkyValues>, Failure> {
-        let sums = || FieldSky::new(field, directions, measure);
         if !bake.is_whole() {
-            return bake.compute_cells(job, self.name)?.map(|planes| {
-                let mut sky = sums()?;
-                let planes = planes.chunks_exact(field.heights().len()).enumerate();
-                planes.for_each(|(index, plane)| sky.add(index, plane));
-                Ok(sky.finish())
-            });
+            let done = bake.compute_cells(job, self.name)?;
+            return done.map(|angles| job.sky_of(&angles, measure));
         }
-        let (start, count) = (Instant::now(), directions.len());
         check_answers(self.name, FieldSky::memory(field))?;
-        let progress = Progress::new(self.name);
-        let mut sky = sums()?;
-        for index in 0..count {
-            sky.add(index, &job.plane(index, &Share(&progress, [index, count]))?);
-        }
+        let (start, progress) = (Instant::now(), Progress::new(self.name));
+        let sky = job.sky(measure, &progress)?;
         progress.finish();
-        Ok(Done::whole(sky.finish(), start.elapsed().as_secs_f64()))
+        Ok(Done::whole(sky, start.elapsed().as_secs_f64()))
     }
 
     /// Number of values of each sensor.
@@ -481,8 +471,12 @@ impl Horizon<'_> {
                 ));
             }
             if let Some([mean, most]) = quadrature_error {
+                let finer = match planes < 48 {
+                    true => "; --azimuths lattice:48 is finer",
+                    false => "",
+                };
                 tell(format_args!(
-                    "with half of the azimuths values differ by {mean:.4} on average and {most:.4} at most; --azimuths lattice:N has more",
+                    "the next coarser azimuths differ by {mean:.4} on average and {most:.4} at most{finer}"
                 ));
             }
             bake.end("angles", (self.number * planes) as u64, done);

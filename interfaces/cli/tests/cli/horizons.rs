@@ -134,7 +134,7 @@ fn cells_have_the_sky_that_their_horizons_leave() {
         "{said}"
     );
     assert!(
-        said.contains("with half of the azimuths values differ by 0.0"),
+        said.contains("the next coarser azimuths differ by 0.0"),
         "{said}"
     );
     let rows = place.rows("sky.csv");

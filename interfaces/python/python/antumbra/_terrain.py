@@ -49,7 +49,7 @@ class Sky(NamedTuple):
     values: NDArray[np.float32]
     """The measure of each cell: (rows, columns). NaN without data."""
     quadrature_error: tuple[float, float] | None
-    """Mean and greatest difference from the values of half as many azimuths; None if there are too few. The error left is mostly smaller."""
+    """Mean and greatest difference from the next coarser lattice, or from every second azimuth; None if there are too few."""
 
 
 class HeightField:
