@@ -115,7 +115,10 @@ fn rasters_in(folder: &Path) -> Result<Vec<PathBuf>, Error> {
 
 /// Rasters beside one that continue it on the same lattice, by their headers. So shadows and horizons of its cells do not see all
 /// that is there. Of large folders, only some hundred files with names near its own are looked at, and unreadable ones are left out.
-pub fn neighbours(path: &Path, own: &Grid) -> Vec<PathBuf> {
+pub fn neighbours(path: &Path) -> Vec<PathBuf> {
+    let Ok(own) = grid(path) else {
+        return Vec::new();
+    };
     let folder = path.parent().filter(|folder| *folder != Path::new(""));
     let mut all = rasters_in(folder.unwrap_or(Path::new("."))).unwrap_or_default();
     let is_own = |other: &PathBuf| other.file_name() == path.file_name();

@@ -252,9 +252,8 @@ fn neighbours_continue_a_tile_on_its_lattice() {
     shifted.grid.transform[0] += 0.2;
     save(&folder.path().join("shifted.tif"), &shifted);
     fs::write(folder.path().join("damaged.tif"), "II").expect("a file");
-    let own = read(&paths[0], 1 << 30, Purpose::Values).expect("a tile");
     let wanted = [1, 3, 4].map(|index| paths[index].clone());
-    assert_eq!(neighbours(&paths[0], &own.grid), wanted);
+    assert_eq!(neighbours(&paths[0]), wanted);
 }
 
 /// A virtual raster as `gdalbuildvrt` writes it, with these sources, of columns 0 to 9 and 8 to 19 of a raster.
@@ -501,7 +500,7 @@ fn a_real_model_in_tiles() {
         let pairs = own.values.iter().zip(&tile.values);
         let is_same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
         assert!(pairs.into_iter().all(is_same), "{}", file.display());
-        let beside = neighbours(file, &tile.grid);
+        let beside = neighbours(file);
         assert!(
             (3..=8).contains(&beside.len()),
             "{}: {}",

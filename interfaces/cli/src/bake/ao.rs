@@ -144,6 +144,7 @@ impl Baking for AoArgs {
 
     fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
         let (format, output) = (format(self)?, &self.output[0]);
+        bake.tell_neighbours(&self.scene);
         let mut ground = bake.ground(&mut files, None)?;
         if let Some(resolution) = self.resolution {
             set_resolution(&mut ground.loaded.scene, resolution.0)?;

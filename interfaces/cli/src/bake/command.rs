@@ -13,6 +13,7 @@ use serde::{Serialize, Serializer};
 use super::chunks::{self, PartFile};
 use super::ground::Ground;
 use super::map;
+use super::neighbours::tell_neighbours;
 use super::raster::is_raster;
 use super::terrain::Terrain;
 use super::visible::VisibleArgs;
@@ -247,6 +248,14 @@ impl Bake<'_> {
     pub fn terrain_of(&self, raster: &[PathBuf], files: &mut Files) -> Result<Terrain, Failure> {
         self.start_threads()?;
         Terrain::load(raster, self.memory, files)
+    }
+
+    /// Says which files beside a height raster go on where it ends, if it is one. Not for lines between two of its points, which stay
+    /// inside of it.
+    pub fn tell_neighbours(&self, raster: &[PathBuf]) {
+        if self.parts.is_none() {
+            tell_neighbours(raster, self.memory);
+        }
     }
 
     /// Computes a job, or one share of it, with a tree of the scene. With parts, joins them instead.

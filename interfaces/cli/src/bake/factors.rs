@@ -67,6 +67,7 @@ impl Baking for FactorArgs {
     }
 
     fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
+        bake.tell_neighbours(&self.scene);
         let mut ground = bake.ground(&mut files, None)?;
         let scene = &ground.loaded.scene;
         let mut shapes = scene.shapes.iter();

@@ -17,7 +17,6 @@ use antumbra_render::World;
 use antumbra_scene::{Geometry, Scene, Shape, TriangleMesh};
 
 use super::parts::Parts;
-use super::raster::tell_neighbours;
 use super::visible::VisibleArgs;
 use crate::exit::{Failure, say, tell};
 use crate::output::Files;
@@ -52,9 +51,6 @@ impl Ground {
     ) -> Result<Self, Failure> {
         let mut loaded = scenes::load_one(names, memory)?;
         files.reads_all(&loaded.inputs)?;
-        if let Some(raster) = &loaded.raster {
-            tell_neighbours(names, &raster.grid);
-        }
         let flat = loaded.scene.flattened();
         let flat = flat.map_err(|error| Failure::scene(&loaded.scene.name, error))?;
         loaded.scene = flat.into_owned();

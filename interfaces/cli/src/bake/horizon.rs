@@ -78,11 +78,12 @@ pub struct HorizonArgs {
     /// the cells of a --grid or of a scene that is a raster, or the value of --show. A shard is a .part.
     #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
-    /// What to write: angles, or the sky that they leave open
+    /// Angles, or how open the sky is
     ///
     /// angles are degrees for each azimuth. All others are for --cells of a height raster, and one number for each cell, a sum over its
     /// horizons: sky-view is the part of the light of an even sky that the surface of the cell receives, sky-open the part of the
-    /// hemisphere above that nothing hides, and openness degrees from the zenith down to the horizon. The sky ends at the horizontal. The end of the run says how much values of the next coarser lattice, or of every second azimuth, differ.
+    /// hemisphere above that nothing hides, and openness degrees from the zenith down to the horizon. The sky ends at the horizontal. The
+    /// end of the run says how much values of the next coarser lattice, or of every second azimuth, differ.
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = Shown::Angles, hide_possible_values = true, help_heading = heading::OUTPUT)]
     pub show: Shown,
     #[command(flatten)]
@@ -195,6 +196,7 @@ impl Baking for HorizonArgs {
     }
 
     fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
+        bake.tell_neighbours(&self.scene);
         if self.is_of_cells() {
             return of_cells(self, bake, files);
         }

@@ -8,6 +8,7 @@
 //! - `command`: the steps that all of them have in common
 //! - `site`: where on the earth a scene is
 //! - `ground`, `parts`, `places`, `view`: scenes, names of their triangles, and points of them;  `terrain`: height rasters without either
+//! - `neighbours`: tiles beside a height raster
 //! - `chunks`: files of unfinished work and of shares
 //! - `files`: formats and writers of results;  `map`: maps of grids;  `raster`: results as GeoTIFF, .asc and .npy
 
@@ -20,6 +21,7 @@ mod ground;
 mod horizon;
 pub mod map;
 pub mod merge;
+mod neighbours;
 mod parts;
 mod places;
 mod raster;

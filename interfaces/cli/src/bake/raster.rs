@@ -4,32 +4,15 @@ use std::path::{Path, PathBuf};
 
 use antumbra_bake::{Layout, Orientation, Sensors, UpAxis};
 use antumbra_image::atomic_write;
-use antumbra_raster::{Crs, Grid, Quantity, RasterCells, neighbours};
+use antumbra_raster::{Crs, Grid, Quantity, RasterCells};
 
 use super::ground::Ground;
-use crate::exit::{Failure, tell};
+use crate::exit::Failure;
 use crate::output;
 
 /// Whether a scene is a height raster, perhaps of several files, by its names.
 pub fn is_raster(scene: &[PathBuf]) -> bool {
     scene.iter().all(|path| antumbra_raster::is_raster(path))
-}
-
-/// Says that others beside the only file go on where it ends.
-pub fn tell_neighbours(scene: &[PathBuf], grid: &Grid) {
-    let [file] = scene else {
-        return;
-    };
-    let beside = neighbours(file, grid);
-    if let (Some(first), true) = (beside.first(), file.is_file()) {
-        tell(format_args!(
-            "note: {}: cells go on in {} files beside it, such as {}; shadows and horizons do not see what is behind the border, unless \
-             the scene is the folder or all files",
-            file.display(),
-            beside.len(),
-            first.file_name().unwrap_or_default().display(),
-        ));
-    }
 }
 
 /// Writes values of sensors, which are the vertices of a height raster or the cells of a grid. A unit of the scene has so many

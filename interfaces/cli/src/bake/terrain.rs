@@ -9,7 +9,7 @@ use antumbra_lab::count;
 use antumbra_load::{Extent, Heights, MemorySize, raster_name};
 use antumbra_raster::{Crs, Grid, Site};
 
-use super::raster::{is_raster, tell_neighbours};
+use super::raster::is_raster;
 use super::site::Asked;
 use crate::exit::{Failure, tell};
 use crate::output::Files;
@@ -35,7 +35,6 @@ impl Terrain {
         let start = Instant::now();
         let heights = scenes::load_heights(scene, memory)?;
         files.reads_all(&heights.inputs)?;
-        tell_neighbours(scene, &heights.raster.grid);
         let Some(extent) = heights.extent else {
             return Err(Failure::scene(&name, "it has no cell with data"));
         };

@@ -82,6 +82,57 @@ fn results_are_where_the_heights_were() {
     assert!(open.values[40 * 15 + 20] > open.values[40 * 15 + 19]);
 }
 
+/// Angles of cells in 32 azimuths, plane by plane.
+fn angles(place: &Place, scene: &str) -> (Vec<f32>, String) {
+    let args = ["horizon", scene, "--cells", "--azimuths", "32", "-o"];
+    let said = place.run(&[&args[..], &["angles.npy"]].concat()).expect(0);
+    let bytes = fs::read(place.path("angles.npy")).expect("a file");
+    let head = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    let number = |bytes: &[u8]| f32::from_le_bytes(bytes.try_into().expect("4 bytes"));
+    let angles = bytes[head..].chunks_exact(4).map(number);
+    (angles.collect(), said.stderr)
+}
+
+#[test]
+fn a_tile_alone_knows_how_many_of_its_cells_see_more() {
+    let place = place();
+    let [a, b, ..] = tiles(&place);
+    let (whole, said) = angles(&place, "tiles");
+    assert!(!said.contains("beside it"), "{said}");
+    // Of the north-western tile, 25 x 11 cells.
+    let (own, said) = angles(&place, a);
+    let is_higher = |cell: &usize| {
+        let (column, row) = (cell % 25, cell / 25);
+        (0..32).any(|azimuth| {
+            let [all, own] = [
+                whole[(30 * azimuth + row) * 40 + column],
+                own[(11 * azimuth + row) * 25 + column],
+            ];
+            all.max(0.0) >= own.max(0.0) + 0.1
+        })
+    };
+    let higher = (1..25 * 11).filter(is_higher).count() as f64 / 274.0;
+    let (_, part) = said.split_once("of its 274 cells (").expect(&said);
+    let part: f64 = part
+        .split_once(" %")
+        .and_then(|(part, _)| part.parse().ok())
+        .expect(&said);
+    assert!(
+        (1.0..99.0).contains(&part) && (part - 100.0 * higher).abs() < 3.0,
+        "{part} % of {higher}"
+    );
+    // All cells east of the wall see it, and no line between two cells leaves a raster.
+    let (_, said) = angles(&place, b);
+    assert!(
+        said.contains("About 165 of its 165 cells (100 %)"),
+        "{said}"
+    );
+    place.write("eyes.csv", "x,y\n600055,5339955\n");
+    let args = ["visible", a, "eyes.csv", "--viewshed", "-o", "seen.tif"];
+    let said = place.run(&args).expect(0).stderr;
+    assert!(!said.contains("beside it"), "{said}");
+}
+
 /// Cuts the plain into four tiles, and names them from the north west to the south east.
 fn tiles(place: &Place) -> [&'static str; 4] {
     let (all, heights) = plain();
@@ -150,13 +201,8 @@ fn tiles_are_one_raster() {
     let alone = place
         .run(&["horizon", a, "--cells", "-o", "a.npy"])
         .expect(0);
-    assert!(
-        alone
-            .stderr
-            .contains("tiles/a.tif: cells go on in 3 files beside it, such as b.tif"),
-        "{}",
-        alone.stderr
-    );
+    let line = "tiles/a.tif: cells go on in 3 files beside it, such as b.tif. About ";
+    assert!(alone.stderr.contains(line), "{}", alone.stderr);
     fs::create_dir(place.path("empty")).expect("a folder");
     for (args, code, words) in [
         (

@@ -253,6 +253,10 @@ impl Baking for SunArgs {
     fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
         around::check(self)?;
         let begin = Instant::now();
+        bake.tell_neighbours(match self.terrain.is_empty() {
+            true => &self.scene,
+            false => &self.terrain,
+        });
         let weather = self.epw.as_deref().map(read_weather).transpose()?;
         if self.places.vertices && is_terrain(self.raster_scene(), self.places.up)
             || self.has_terrain_cells()
