@@ -68,7 +68,14 @@ impl<'a> HeightField<'a> {
         let cells = width.saturating_mul(height);
         Error::check_length("heights", heights.len(), cells)?;
         Error::check_range("number of cells", cells as f64, cells > 0, "at least 1")?;
-        let endless = heights.iter().find(|height| height.is_infinite());
+        // Part by part, since a search cell by cell waits for each.
+        let has_all = |part: &[f64]| {
+            part.iter()
+                .fold(true, |all, height| all & height.is_finite())
+        };
+        let is_whole = heights.chunks(4096).all(has_all);
+        let mut endless = heights.iter().filter(|_| !is_whole);
+        let endless = endless.find(|height| height.is_infinite());
         let wanted = "finite heights, or NaN where there is no data";
         let height_found = endless.copied().unwrap_or_default();
         Error::check_range("height", height_found, endless.is_none(), wanted)?;
@@ -79,7 +86,7 @@ impl<'a> HeightField<'a> {
             transform,
             wires: HashSet::new(),
             // A single row has no triangle, so that none of its edges counts.
-            has_holes: width < 2 || height < 2 || heights.iter().any(|height| !height.is_finite()),
+            has_holes: width < 2 || height < 2 || !is_whole,
         };
         if field.has_holes {
             field.find_wires();
@@ -227,6 +234,9 @@ impl<'a> HeightField<'a> {
 
     /// Number of triangles of the surface.
     pub fn triangles(&self) -> usize {
+        if !self.has_holes {
+            return 2 * (self.width - 1) * (self.height - 1);
+        }
         let has = |cell: usize| usize::from(self.rows[cell].is_finite());
         let squares = (1..self.height)
             .flat_map(|row| (1..self.width).map(move |column| row * self.width + column));

@@ -70,19 +70,38 @@ pub fn load_heights(paths: &[PathBuf], options: &Options) -> Result<Heights, Err
     if options.strict && !warnings.is_empty() {
         return Err(Error::Strict(warnings));
     }
-    let width = raster.grid.width;
-    let cells = raster.values.iter().enumerate();
-    let centres = cells.map(|(cell, &z)| {
-        let [x, y] = raster.grid.centre(cell % width, cell / width);
-        [x, y, z]
-    });
-    let extent = Extent::around(centres);
+    let extent = Extent::around(ends(&raster));
     Ok(Heights {
         raster,
         extent,
         warnings,
         tiles,
         inputs,
+    })
+}
+
+/// The first and last centres with data of each row, at its least and at its greatest height: all others are between them.
+fn ends(raster: &Raster) -> impl Iterator<Item = [f64; 3]> {
+    let rows = raster
+        .values
+        .chunks_exact(raster.grid.width.max(1))
+        .enumerate();
+    rows.flat_map(move |(row, heights)| {
+        let is_known = |height: &f64| height.is_finite();
+        let first = heights.iter().position(is_known);
+        let last = heights.iter().rposition(is_known);
+        // Without data, nothing is less and nothing greater.
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for &height in heights {
+            let height = if height.is_finite() { height } else { f64::NAN };
+            low = if height < low { height } else { low };
+            high = if height > high { height } else { high };
+        }
+        let columns = first.into_iter().chain(last);
+        columns.flat_map(move |column| {
+            let [x, y] = raster.grid.centre(column, row);
+            [low, high].map(|z| [x, y, z])
+        })
     })
 }
 
@@ -144,6 +163,42 @@ mod tests {
         let plain = load_heights(&[path], &Options::default()).expect("heights");
         assert_eq!(plain.extent.expect("an extent").size(), extent.size());
         assert!(loaded.warnings.is_empty() && plain.raster.values[5] == 6.0);
+    }
+
+    #[test]
+    fn the_extent_is_that_of_all_centres_with_data() {
+        let transforms = [
+            [6e5, 2.0, 0.0, 5e6, 0.0, -2.0],
+            [6e5, 1.7, 0.3, 5e6, 0.4, -2.1],
+            [6e5, -1.1, 0.9, 5e6, -0.8, -1.3],
+        ];
+        let mut state = 1_u64;
+        for transform in transforms {
+            for size in [[1, 1], [1, 7], [9, 1], [13, 8], [40, 31]] {
+                let heights = (0..size[0] * size[1]).map(|_| {
+                    state = state
+                        .wrapping_mul(6_364_136_223_846_793_005)
+                        .wrapping_add(1);
+                    let height = (state >> 40) as f64;
+                    if state >> 62 == 0 { height } else { f64::NAN }
+                });
+                let values: Vec<f64> = heights.collect();
+                let mut grid = antumbra_raster::Grid::north_up(size, [0.0; 2], 1.0);
+                grid.transform = transform;
+                let centres = values.iter().enumerate().map(|(cell, &z)| {
+                    let [x, y] = grid.centre(cell % size[0], cell / size[0]);
+                    [x, y, z]
+                });
+                let wanted = Extent::around(centres).map(|extent| [extent.low, extent.high]);
+                let raster = antumbra_raster::Raster {
+                    grid: grid.clone(),
+                    values: values.clone(),
+                    height_factor: None,
+                };
+                let found = Extent::around(super::ends(&raster));
+                assert_eq!(found.map(|extent| [extent.low, extent.high]), wanted);
+            }
+        }
     }
 
     #[test]

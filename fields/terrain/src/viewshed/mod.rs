@@ -63,7 +63,7 @@ impl Default for Limits {
 pub struct Viewer<'a>(Turned<'a>);
 
 impl<'a> Viewer<'a> {
-    /// A viewer of this field, with a copy of its heights column by column.
+    /// A viewer of this field, with the peaks of blocks of its rows and columns: half a byte for each cell.
     ///
     /// # Errors
     /// [`Error::NoMemory`].

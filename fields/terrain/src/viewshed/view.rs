@@ -1,4 +1,4 @@
-//! A height field as it is swept for viewsheds: by rows and by columns, with the tops of blocks.
+//! A height field as it is swept for viewsheds: by rows or by columns, with the tops of blocks.
 
 use std::collections::HashSet;
 use std::ops::Range;
@@ -6,37 +6,18 @@ use std::ops::Range;
 use crate::height_field::Wire;
 use crate::{Error, HeightField, memory};
 
-/// Cells that are turned at a time, so that rows and columns stay in the cache.
-const TILE: usize = 32;
-
-/// A field in both orders.
+/// A field as it is looked at from all sides.
 pub struct Turned<'a> {
     field: &'a HeightField<'a>,
-    /// Heights column by column: a transposed copy.
-    columns: Vec<f64>,
     /// Tops of rows and of columns: see [`tops`].
     tops: [Vec<f64>; 2],
 }
 
 impl<'a> Turned<'a> {
     pub fn new(field: &'a HeightField<'a>) -> Result<Self, Error> {
-        let [width, height] = field.size();
-        let heights = field.heights();
-        let mut columns = memory::filled("heights", heights.len(), 0.0)?;
-        for top in (0..height).step_by(TILE) {
-            for left in (0..width).step_by(TILE) {
-                for column in left..(left + TILE).min(width) {
-                    for row in top..(top + TILE).min(height) {
-                        columns[column * height + row] = heights[row * width + column];
-                    }
-                }
-            }
-        }
-        let tops = [tops(heights, width)?, tops(&columns, height)?];
         Ok(Self {
             field,
-            columns,
-            tops,
+            tops: tops(field)?,
         })
     }
 
@@ -52,16 +33,16 @@ impl<'a> Turned<'a> {
         let is_east_west = matches!(side, Side::East | Side::West);
         let [xx, xy, yy] = metric;
         let tops = &self.tops[usize::from(is_east_west)][..];
-        let (heights, size, at, metric) = match is_east_west {
+        let (size, steps, at, metric) = match is_east_west {
             true => (
-                &self.columns[..],
                 [width, height],
+                [1, width as isize],
                 [column, row],
                 [xx, xy, yy],
             ),
             false => (
-                self.field.heights(),
                 [height, width],
+                [width as isize, 1],
                 [row, column],
                 [yy, xy, xx],
             ),
@@ -69,7 +50,13 @@ impl<'a> Turned<'a> {
         let is_turned = matches!(side, Side::West | Side::North);
         let last = size.map(|size| size as f64 - 1.0);
         View {
-            heights,
+            heights: self.field.heights(),
+            first: if is_turned { width * height - 1 } else { 0 },
+            steps: if is_turned {
+                steps.map(|step| -step)
+            } else {
+                steps
+            },
             lines: size[0],
             length: size[1],
             eye: match is_turned {
@@ -78,7 +65,6 @@ impl<'a> Turned<'a> {
             },
             metric,
             is_turned,
-            is_east_west,
             tops,
             wires: self.field.wires(),
         }
@@ -91,21 +77,50 @@ const BLOCK: usize = 32;
 /// Cells on both sides of a block that its top counts: those that edges of the block may end at.
 const MARGIN: usize = 2;
 
-/// Largest height in each block of each line, and in the cells beside it.
-fn tops(heights: &[f64], length: usize) -> Result<Vec<f64>, Error> {
-    let mut tops = Vec::new();
-    for line in heights.chunks_exact(length) {
-        memory::grow(&mut tops, "heights", length.div_ceil(BLOCK))?;
-        tops.extend((0..length).step_by(BLOCK).map(|first| {
-            let cells = first.saturating_sub(MARGIN)..(first + BLOCK + MARGIN).min(length);
-            let known = line[cells]
-                .iter()
-                .copied()
-                .filter(|height| height.is_finite());
-            known.fold(f64::NEG_INFINITY, f64::max)
-        }));
+/// Largest height in each block of each row and of each column, and in the cells beside it.
+fn tops(field: &HeightField<'_>) -> Result<[Vec<f64>; 2], Error> {
+    let (heights, [width, height]) = (field.heights(), field.size());
+    let blocks = [width, height].map(|length| length.div_ceil(BLOCK));
+    let mut of_rows = memory::filled("heights", height * blocks[0], f64::NEG_INFINITY)?;
+    let mut of_columns = memory::filled("heights", width * blocks[1], f64::NEG_INFINITY)?;
+    let mut highest = memory::filled("heights", width, f64::NEG_INFINITY)?;
+    let around = |block: usize, length: usize| {
+        let first = block * BLOCK;
+        first.saturating_sub(MARGIN)..(first + BLOCK + MARGIN).min(length)
+    };
+    for block in 0..blocks[1] {
+        highest.fill(f64::NEG_INFINITY);
+        for row in around(block, height) {
+            let line = &heights[row * width..(row + 1) * width];
+            for (highest, &height) in highest.iter_mut().zip(line) {
+                *highest = larger(*highest, height);
+            }
+        }
+        for (column, &highest) in highest.iter().enumerate() {
+            of_columns[column * blocks[1] + block] = highest;
+        }
     }
-    Ok(tops)
+    for (line, tops) in heights
+        .chunks_exact(width)
+        .zip(of_rows.chunks_exact_mut(blocks[0]))
+    {
+        for (block, top) in tops.iter_mut().enumerate() {
+            // Several at a time, since each waits for the one before.
+            let mut highest = [f64::NEG_INFINITY; 8];
+            for cells in line[around(block, width)].chunks(highest.len()) {
+                for (highest, &height) in highest.iter_mut().zip(cells) {
+                    *highest = larger(*highest, height);
+                }
+            }
+            *top = highest.into_iter().fold(f64::NEG_INFINITY, larger);
+        }
+    }
+    Ok([of_rows, of_columns])
+}
+
+/// The larger one of two heights, of which the second may be NaN, which is left out.
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a { b } else { a }
 }
 
 /// A quarter of the plan around an eye.
@@ -124,7 +139,11 @@ impl Side {
 /// A field that an eye looks along: lines are ahead one behind another, and the cells of each line from side to side. Diagonals go
 /// from a cell to the next one of the next line.
 pub struct View<'a> {
+    /// Heights of the raster, row by row.
     heights: &'a [f64],
+    /// Cell of the raster that is the first one of the first line, and steps to the next line and to the next cell.
+    first: usize,
+    steps: [isize; 2],
     pub lines: usize,
     pub length: usize,
     /// Line of the eye, and its place there.
@@ -132,7 +151,6 @@ pub struct View<'a> {
     /// Products of the steps to the next line and to the next cell: squared lengths of plans are `xx x² + 2 xy x y + yy y²`.
     pub metric: [f64; 3],
     is_turned: bool,
-    is_east_west: bool,
     tops: &'a [f64],
     wires: &'a HashSet<Wire>,
 }
@@ -141,16 +159,15 @@ impl View<'_> {
     /// Height of a cell.
     #[inline]
     pub fn height(&self, line: usize, at: usize) -> f64 {
-        self.heights[self.index(line, at)]
+        self.heights[self.cell(line, at)]
     }
 
+    /// Number of a cell in the rows of the raster.
     #[inline]
-    fn index(&self, line: usize, at: usize) -> usize {
-        let index = line * self.length + at;
-        match self.is_turned {
-            true => self.heights.len() - 1 - index,
-            false => index,
-        }
+    pub fn cell(&self, line: usize, at: usize) -> usize {
+        let [to_line, to_cell] = self.steps;
+        self.first
+            .wrapping_add_signed(to_line * line as isize + to_cell * at as isize)
     }
 
     /// Number of blocks of a line.
@@ -183,16 +200,6 @@ impl View<'_> {
         match self.is_turned {
             true => self.tops[self.tops.len() - 1 - index],
             false => self.tops[index],
-        }
-    }
-
-    /// Number of a cell in the rows of the raster.
-    #[inline]
-    pub fn cell(&self, line: usize, at: usize) -> usize {
-        let index = self.index(line, at);
-        match self.is_east_west {
-            true => index % self.length * self.lines + index / self.length,
-            false => index,
         }
     }
 

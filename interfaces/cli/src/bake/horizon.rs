@@ -261,7 +261,7 @@ fn of_cells(args: &HorizonArgs, bake: &Bake<'_>, mut files: Files) -> Result<(),
         name: &terrain.name,
         show: args.show,
         azimuths: &azimuths,
-        number: terrain.cells().count(),
+        number: terrain.known,
         triangles: field.triangles(),
         seconds: [terrain.load_seconds, start.elapsed().as_secs_f64()],
     };

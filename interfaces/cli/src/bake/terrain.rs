@@ -20,6 +20,8 @@ pub struct Terrain {
     pub name: String,
     pub heights: Heights,
     pub extent: Extent,
+    /// Number of cells with data.
+    pub known: usize,
     pub load_seconds: f64,
 }
 
@@ -38,8 +40,10 @@ impl Terrain {
         let Some(extent) = heights.extent else {
             return Err(Failure::scene(&name, "it has no cell with data"));
         };
+        let known = heights.raster.values.iter();
         Ok(Self {
             name,
+            known: known.filter(|height| height.is_finite()).count(),
             heights,
             extent,
             load_seconds: start.elapsed().as_secs_f64(),
@@ -100,7 +104,7 @@ impl Terrain {
         tell(format_args!(
             "{}: {} cells, loaded in {:.2} s",
             self.name,
-            count(self.cells().count() as u64),
+            count(self.known as u64),
             self.load_seconds
         ));
     }

@@ -129,7 +129,7 @@ pub fn figures<'a>(
     }
     Figures {
         file: &terrain.name,
-        cells: terrain.cells().count(),
+        cells: terrain.known,
         bytes: size_of_val(&terrain.heights.raster.values[..]) + around.bytes(),
         tree_bytes: ground.bvh.report().bytes,
         sensors_below: below,
