@@ -54,7 +54,7 @@ fn cells_are_lit_where_their_horizon_is_below_the_light() {
         let shadows = Shadows::new(&field, rise).expect("shadows");
         let planes = shadows.all_lit(&directions, &()).expect("planes");
         let mut seen = vec![0; heights.len()];
-        per_cell(&planes, size[0], &mut seen, |_, own, bits| *own = bits);
+        per_cell(&planes, size[0], &mut seen, |_, own, bits| own[0] = bits);
         for (index, &direction) in directions.iter().enumerate() {
             let wanted = expected(&field, rise, direction);
             for (cell, (&seen, wanted)) in seen.iter().zip(wanted).enumerate() {
@@ -88,7 +88,7 @@ fn long_shadows_cross_many_blocks_of_rows() {
     ] {
         let plane = shadows.all_lit(&[direction], &()).expect("a plane");
         let mut lit = vec![false; heights.len()];
-        per_cell(&plane, size[0], &mut lit, |_, lit, seen| *lit = seen == 1);
+        per_cell(&plane, size[0], &mut lit, |_, lit, seen| lit[0] = seen == 1);
         assert!(lit == expected(&field, 0.0, direction), "{direction:?}");
     }
 }

@@ -6,7 +6,7 @@ use antumbra::{Aabb, Bvh, Ray};
 use antumbra_terrain::{HeightField, Shadows, Share, per_cell};
 use rayon::prelude::*;
 
-use crate::sun::sunlight::{Lights, Received, facing};
+use crate::sun::sunlight::{Lights, facing};
 use crate::vector::above;
 use crate::{
     Answers, BitMatrix, Error, Job, Key, Monitor, Size, SunFound, SunValues, Sunlight,
@@ -27,7 +27,6 @@ pub struct FieldSunJob<'a> {
     directions: Vec<[f64; 2]>,
     /// Normals of all cells; 0 without a triangle.
     normals: Vec<[f32; 3]>,
-    by_month: bool,
     scene: Option<Scene<'a>>,
 }
 
@@ -41,11 +40,8 @@ struct Scene<'a> {
     directions: Vec<[f32; 3]>,
 }
 
-/// A cell, and the lights that it sees if these are kept.
-struct Cell<'a> {
-    received: Received,
-    seen: &'a mut [u64],
-}
+/// Cells whose sums are given back at once, when they have become values.
+const GIVEN_BACK: usize = 1 << 16;
 
 /// Lights that are answered at once.
 const BATCH: usize = 64;
@@ -71,12 +67,11 @@ impl<'a> FieldSunJob<'a> {
         Ok(Self {
             field,
             shadows: Shadows::new(field, rise)?,
-            lights: Lights::new(sunlight)?,
+            lights: Lights::new(sunlight, by_month)?,
             sunlight,
             rise,
             directions: sunlight.on_map(north),
             normals,
-            by_month,
             scene: None,
         })
     }
@@ -118,13 +113,13 @@ impl<'a> FieldSunJob<'a> {
 
     /// Bytes that [`FieldSunJob::whole`] takes, about.
     pub fn memory(&self, keeps: bool) -> u64 {
-        let months = if self.by_month { 2 * 288 } else { 0 };
         let kept = if keeps { 2 * self.lights.len() / 8 } else { 0 };
-        let bytes = size_of::<Cell<'_>>() + 5 * size_of::<f64>() + BATCH / 8 + months + kept;
+        // Sums become values one by one.
+        let bytes = size_of::<f64>() * self.lights.sums() + BATCH / 8 + kept;
         self.normals.len() as u64 * bytes as u64
     }
 
-    fn with_data(&self) -> impl Iterator<Item = usize> {
+    fn with_data(&self) -> impl DoubleEndedIterator<Item = usize> + '_ {
         let heights = self.field.heights();
         (0..heights.len()).filter(|&cell| heights[cell].is_finite())
     }
@@ -167,31 +162,35 @@ impl<'a> FieldSunJob<'a> {
         batches: impl Iterator<Item = Result<Vec<P>, Error>>,
     ) -> Result<SunFound, Error> {
         let [width, _] = self.field.size();
-        let cells = self.normals.len();
+        let (cells, each) = (self.normals.len(), self.lights.sums());
         let mut seen = BitMatrix::new(if keeps { cells } else { 0 }, self.lights.len())?;
-        let per_row = seen.words_per_row();
-        let mut rows = seen.words_mut().chunks_mut(per_row.max(1));
-        let mut all = memory::room("cells", cells)?;
-        all.extend((0..cells).map(|_| Cell {
-            received: Received::new(self.by_month),
-            seen: rows.next().unwrap_or_default(),
-        }));
+        let mut all = memory::filled("sums", cells * each, 0.0)?;
+        let normal_of = |cell: usize| facing(Some(self.normals[cell]), &self.sunlight.orientation);
         for (batch, planes) in batches.enumerate() {
-            per_cell(&planes?, width, &mut all, |cell, own, word| {
-                self.add(
-                    &mut own.received,
-                    cell,
-                    BATCH * batch,
-                    word,
-                    own.seen.get_mut(batch),
-                );
+            let (planes, first) = (planes?, BATCH * batch);
+            per_cell(&planes, width, &mut all, |cell, sums, lit| {
+                if let Some(normal) = normal_of(cell).filter(|_| lit != 0) {
+                    self.lights.add(sums, normal, (first, lit), true);
+                }
+            });
+            per_cell(&planes, width, seen.words_mut(), |cell, seen, lit| {
+                if let Some(normal) = normal_of(cell).filter(|_| lit != 0) {
+                    seen[batch] = self.lights.faced(normal, (first, lit));
+                }
             });
         }
-        let mut values = SunValues::with_room(cells, &self.lights, self.by_month)?;
-        for cell in self.with_data() {
+        // From the last cell on, so that the sums of those behind are given back on the way.
+        let mut values = SunValues::with_room(cells, &self.lights)?;
+        for cell in self.with_data().rev() {
             let faces = self.normals[cell] != [0.0; 3];
-            values.push(&self.lights, faces.then_some(&all[cell].received));
+            let sums = &all[each * cell..][..each];
+            values.push(&self.lights, faces.then_some(sums));
+            if cell.is_multiple_of(GIVEN_BACK) {
+                all.truncate(each * cell);
+                all.shrink_to_fit();
+            }
         }
+        values.reverse();
         drop(all);
         let kept: Vec<&[u64]> = match keeps {
             true => self.with_data().map(|cell| seen.row(cell)).collect(),
@@ -203,25 +202,6 @@ impl<'a> FieldSunJob<'a> {
             sky_seen,
             values,
         })
-    }
-
-    /// Adds what a cell receives from the lights of 64 that it sees and faces, and notes them.
-    fn add(
-        &self,
-        received: &mut Received,
-        cell: usize,
-        first: usize,
-        lit: u64,
-        seen: Option<&mut u64>,
-    ) {
-        let normal = facing(Some(self.normals[cell]), &self.sunlight.orientation);
-        let Some(normal) = normal.filter(|_| lit != 0) else {
-            return;
-        };
-        let faced = self.lights.add(received, normal, (first, lit), true);
-        if let Some(seen) = seen {
-            *seen = faced;
-        }
     }
 }
 

@@ -279,39 +279,47 @@ impl SunValues {
     }
 
     /// Lists with room for so many sensors, with their values by month or without them.
-    pub(crate) fn with_room(
-        sensors: usize,
-        lights: &Lights<'_>,
-        by_month: bool,
-    ) -> Result<Self, Error> {
+    pub(crate) fn with_room(sensors: usize, lights: &Lights<'_>) -> Result<Self, Error> {
         let mut values = Self::default();
         for (list, width) in values.lists(lights.sky.is_some()) {
-            let width = if width > 1 && !by_month { 0 } else { width };
+            let width = if width > 1 && !lights.by_month {
+                0
+            } else {
+                width
+            };
             *list = memory::room("values", width * sensors)?;
         }
         Ok(values)
     }
 
-    /// Adds a sensor, which has no values if it faces nowhere.
-    pub(crate) fn push(&mut self, lights: &Lights<'_>, received: Option<&Received>) {
-        let none = Received::nothing();
-        let received = received.unwrap_or(&none);
+    /// Adds a sensor with its sums, which has no values if it faces nowhere.
+    pub(crate) fn push(&mut self, lights: &Lights<'_>, sums: Option<&[f64]>) {
+        let sums = sums.unwrap_or(&[f64::NAN; MOST_SUMS]);
         let kilo = |watts: f64| watts / 1000.0;
-        self.hours.push(received.hours);
-        self.sky_view.push(received.view / lights.whole_view);
-        self.sky_open.push(received.open / lights.whole_sky);
-        if lights.sky.is_some() {
-            self.direct.push(kilo(received.direct));
-            self.diffuse.push(kilo(received.diffuse));
+        self.hours.push(sums[HOURS]);
+        self.sky_view.push(sums[VIEW] / lights.whole_view);
+        self.sky_open.push(sums[OPEN] / lights.whole_sky);
+        let is_measured = lights.sky.is_some();
+        if is_measured {
+            self.direct.push(kilo(sums[DIRECT]));
+            self.diffuse.push(kilo(sums[DIFFUSE]));
         }
-        let Some(months) = &received.by_month else {
+        if !lights.by_month {
             return;
-        };
-        let [hours, direct, diffuse] = **months;
-        self.by_month.extend(hours);
-        if lights.sky.is_some() {
-            self.direct_by_month.extend(direct.map(kilo));
-            self.diffuse_by_month.extend(diffuse.map(kilo));
+        }
+        let months = |kind: usize| sums[lights.months(kind)..].iter().take(12).copied();
+        self.by_month.extend(months(0));
+        if is_measured {
+            self.direct_by_month.extend(months(1).map(kilo));
+            self.diffuse_by_month.extend(months(2).map(kilo));
+        }
+    }
+
+    /// Turns the order of sensors around.
+    pub(crate) fn reverse(&mut self) {
+        for (list, width) in self.lists(true) {
+            list.reverse();
+            list.chunks_exact_mut(width).for_each(<[f64]>::reverse);
         }
     }
 
@@ -335,47 +343,23 @@ pub(crate) struct Lights<'a> {
     /// Sums over all patches on open level ground.
     whole_view: f64,
     whole_sky: f64,
+    by_month: bool,
 }
 
-/// What a sensor received so far.
-#[derive(Clone)]
-pub(crate) struct Received {
-    hours: f64,
-    /// Irradiation by the sun and the sky in Wh/m².
-    direct: f64,
-    diffuse: f64,
-    /// Solid angle of the sky, weighted by the cosine and as it is.
-    view: f64,
-    open: f64,
-    /// Hours, direct and diffuse irradiation of each month, if they are wanted.
-    by_month: Option<Box<[[f64; 12]; 3]>>,
-}
+/// Places in the sums of a sensor: hours, solid angles of the sky that are weighted by the cosine and as they are, and where irradiance
+/// is known the irradiation by the sun and by the sky in Wh/m². Then come twelve numbers each of the first and the last two, if months are wanted.
+const HOURS: usize = 0;
+const VIEW: usize = 1;
+const OPEN: usize = 2;
+const DIRECT: usize = 3;
+const DIFFUSE: usize = 4;
 
-impl Received {
-    /// A sensor without light.
-    pub fn new(by_month: bool) -> Self {
-        Self::all(0.0, by_month)
-    }
-
-    /// A sensor without values.
-    fn nothing() -> Self {
-        Self::all(f64::NAN, true)
-    }
-
-    fn all(value: f64, by_month: bool) -> Self {
-        Self {
-            hours: value,
-            direct: value,
-            diffuse: value,
-            view: value,
-            open: value,
-            by_month: by_month.then(|| Box::new([[value; 12]; 3])),
-        }
-    }
-}
+/// Most sums of a sensor.
+const MOST_SUMS: usize = 5 + 3 * 12;
 
 impl<'a> Lights<'a> {
-    pub fn new(sunlight: &'a Sunlight) -> Result<Self, Error> {
+    /// The lights of a sky. With `by_month`, there are sums for each month as well.
+    pub fn new(sunlight: &'a Sunlight, by_month: bool) -> Result<Self, Error> {
         let patches = &sunlight.patches;
         let all = |weighting| {
             (0..patches.len()).fold(0.0, |sum, patch| sum + patches.weight(patch, UP, weighting))
@@ -386,7 +370,22 @@ impl<'a> Lights<'a> {
             sky: sunlight.sky()?,
             whole_view: all(Weighting::Cosine),
             whole_sky: all(Weighting::Uniform),
+            by_month,
         })
+    }
+
+    /// Number of sums of a sensor.
+    pub fn sums(&self) -> usize {
+        match self.by_month {
+            true => self.months(if self.sky.is_some() { 3 } else { 1 }),
+            false => self.months(0),
+        }
+    }
+
+    /// Place of the sums of January: of hours, direct and diffuse irradiation.
+    fn months(&self, kind: usize) -> usize {
+        let first = if self.sky.is_some() { DIFFUSE } else { OPEN } + 1;
+        first + 12 * kind
     }
 
     /// Number of suns and patches.
@@ -414,15 +413,32 @@ impl<'a> Lights<'a> {
         Ok([suns_seen, sky_seen])
     }
 
+    /// Lights of 64 that a sensor sees, but for the ones behind the plane of its normal; `first` is the number of the lowest bit.
+    pub fn faced(&self, normal: [f64; 3], (first, seen): (usize, u64)) -> u64 {
+        let suns = self.to_suns.len();
+        let centres = &self.sunlight.patches.centres;
+        let is_faced = |&bit: &usize| {
+            let light = first + bit;
+            let direction = match light.checked_sub(suns) {
+                None => self.to_suns[light],
+                Some(patch) => centres[patch],
+            };
+            dot(normal, direction) > 0.0
+        };
+        let seen = [seen];
+        let faced = ones(&seen).filter(is_faced);
+        faced.fold(0, |faced, bit| faced | 1 << bit)
+    }
+
     /// Adds what a surface with this normal receives from the lights of 64 that it sees; `first` is the number of the lowest bit. If
-    /// `has_plane`, it sees none behind its plane. Returns the lights that it sees then.
+    /// `has_plane`, it sees none behind its plane.
     pub fn add(
         &self,
-        received: &mut Received,
+        sums: &mut [f64],
         normal: [f64; 3],
         (first, seen): (usize, u64),
         has_plane: bool,
-    ) -> u64 {
+    ) {
         let suns = self.to_suns.len();
         let Suns {
             hours,
@@ -430,10 +446,10 @@ impl<'a> Lights<'a> {
             direct,
             ..
         } = &self.sunlight.suns;
+        let is_measured = self.sky.is_some();
         let mut left = seen;
-        let mut faced = 0;
         // In registers, since there may be billions.
-        let mut sums = [received.hours, received.direct];
+        let mut all = [sums[HOURS], if is_measured { sums[DIRECT] } else { 0.0 }];
         while left != 0 {
             let bit = left.trailing_zeros();
             let light = first + bit as usize;
@@ -445,48 +461,43 @@ impl<'a> Lights<'a> {
             if has_plane && !(cosine > 0.0) {
                 continue;
             }
-            faced |= 1 << bit;
             let beam = direct[light] * cosine.max(0.0);
-            sums = [sums[0] + hours[light], sums[1] + beam];
-            if let Some(by_month) = &mut received.by_month {
-                by_month[0][months[light]] += hours[light];
-                by_month[1][months[light]] += beam;
+            all = [all[0] + hours[light], all[1] + beam];
+            if self.by_month {
+                sums[self.months(0) + months[light]] += hours[light];
+                if is_measured {
+                    sums[self.months(1) + months[light]] += beam;
+                }
             }
         }
-        [received.hours, received.direct] = sums;
-        for bit in ones(&[left]) {
-            faced |=
-                u64::from(self.add_patch(received, normal, first + bit - suns, has_plane)) << bit;
+        sums[HOURS] = all[0];
+        if is_measured {
+            sums[DIRECT] = all[1];
         }
-        faced
+        for bit in ones(&[left]) {
+            self.add_patch(sums, normal, first + bit - suns, has_plane);
+        }
     }
 
     /// Adds what a surface receives from a patch of the sky, unless that is behind its plane.
-    fn add_patch(
-        &self,
-        received: &mut Received,
-        normal: [f64; 3],
-        patch: usize,
-        has_plane: bool,
-    ) -> bool {
+    fn add_patch(&self, sums: &mut [f64], normal: [f64; 3], patch: usize, has_plane: bool) {
         let patches = &self.sunlight.patches;
         let cosine = dot(patches.centres[patch], normal);
         if has_plane && !(cosine > 0.0) {
-            return false;
+            return;
         }
         let cosine = cosine.max(0.0);
-        received.view += patches.solid_angles[patch] * cosine;
-        received.open += patches.solid_angles[patch];
+        sums[VIEW] += patches.solid_angles[patch] * cosine;
+        sums[OPEN] += patches.solid_angles[patch];
         if let Some(sky) = &self.sky {
             let of = |radiances: &[f64]| radiances[patch] * patches.solid_angles[patch] * cosine;
-            received.diffuse += of(&sky.of_all);
-            if let Some(months) = &mut received.by_month {
-                let known = sky.by_month.iter().zip(&mut months[2]);
+            sums[DIFFUSE] += of(&sky.of_all);
+            if self.by_month {
+                let known = sky.by_month.iter().zip(&mut sums[self.months(2)..]);
                 let known = known.filter(|(sky, _)| !sky.is_empty());
                 known.for_each(|(sky, diffuse)| *diffuse += of(sky));
             }
         }
-        true
     }
 }
 
@@ -617,20 +628,20 @@ impl Job for SunJob<'_> {
     }
 
     fn found(&self, words: Vec<u64>) -> Result<SunFound, Error> {
-        let (lights, sensors) = (Lights::new(self.sunlight)?, self.places.points.len());
+        let (lights, sensors) = (Lights::new(self.sunlight, true)?, self.places.points.len());
         let rows = words.chunks_exact(lights.len().div_ceil(64).max(1));
         let [suns_seen, sky_seen] = lights.split(rows.clone())?;
-        let mut values = SunValues::with_room(sensors, &lights, true)?;
+        let mut values = SunValues::with_room(sensors, &lights)?;
+        let mut sums = vec![0.0; lights.sums()];
         for (row, words) in rows.enumerate() {
             let normal = facing(self.facing.get(row).copied(), &self.sunlight.orientation);
-            let received = normal.map(|normal| {
-                let mut received = Received::new(true);
+            if let Some(normal) = normal {
+                sums.fill(0.0);
                 for (word, &seen) in words.iter().enumerate() {
-                    lights.add(&mut received, normal, (64 * word, seen), false);
+                    lights.add(&mut sums, normal, (64 * word, seen), false);
                 }
-                received
-            });
-            values.push(&lights, received.as_ref());
+            }
+            values.push(&lights, normal.is_some().then_some(&sums));
         }
         Ok(SunFound {
             values,

@@ -23,8 +23,8 @@ pub fn turn(plane: &[u64], [columns, rows]: [usize; 2]) -> Result<Vec<u64>, Erro
     Ok(turned)
 }
 
-/// Calls `add` for each cell of a raster of this width: with its number, its value, and its bits in up to 64 planes of
-/// [`Shadows::lit`](crate::Shadows::lit), the first one lowest.
+/// Calls `add` for each cell of a raster of this width: with its number, its values, of which all cells have as many, and its bits in up
+/// to 64 planes of [`Shadows::lit`](crate::Shadows::lit), the first one lowest.
 ///
 /// ```
 /// use antumbra_terrain::{HeightField, Shadows, per_cell};
@@ -34,31 +34,44 @@ pub fn turn(plane: &[u64], [columns, rows]: [usize; 2]) -> Result<Vec<u64>, Erro
 /// // A sun in the east, low and then high.
 /// let planes = Shadows::new(&field, 0.0)?.all_lit(&[[90.0, 0.5], [90.0, 1.5]], &())?;
 /// let mut suns = [0; 8];
-/// per_cell(&planes, 4, &mut suns, |_, suns, seen| *suns += seen.count_ones());
+/// per_cell(&planes, 4, &mut suns, |_, suns, seen| suns[0] += seen.count_ones());
 /// assert_eq!(suns, [1, 1, 0, 2, 1, 1, 0, 2]);
 /// # Ok::<(), antumbra_terrain::Error>(())
 /// ```
 ///
 /// # Panics
-/// If there are more than 64 planes, or they are not of as many cells as there are values.
+/// If there are more than 64 planes, or not as many values for each of their cells.
 pub fn per_cell<T: Send, P: AsRef<[u64]> + Sync>(
     planes: &[P],
     width: usize,
     values: &mut [T],
-    add: impl Fn(usize, &mut T, u64) + Sync,
+    add: impl Fn(usize, &mut [T], u64) + Sync,
 ) {
     let words = width.div_ceil(64);
-    let rows = values.par_chunks_mut(width).enumerate();
+    let Some(rows) = planes.first().map(|plane| plane.as_ref().len() / words) else {
+        return;
+    };
+    let each = values.len() / (width * rows);
+    assert_eq!(
+        values.len(),
+        each * width * rows,
+        "as many values for each cell"
+    );
+    if each == 0 {
+        return;
+    }
+    let rows = values.par_chunks_mut(each * width).enumerate();
     rows.for_each(|(row, values)| {
-        for (word, values) in values.chunks_mut(64).enumerate() {
+        for (word, values) in values.chunks_mut(each * 64).enumerate() {
             let mut block = [0; 64];
             for (index, plane) in planes.iter().enumerate() {
                 block[index] = plane.as_ref()[row * words + word];
             }
             transpose(&mut block);
             let first = row * width + 64 * word;
-            for (column, (value, &seen)) in values.iter_mut().zip(&block).enumerate() {
-                add(first + column, value, seen);
+            let cells = values.chunks_exact_mut(each).zip(&block).enumerate();
+            for (column, (values, &seen)) in cells {
+                add(first + column, values, seen);
             }
         }
     });

@@ -378,8 +378,14 @@ impl SunArgs {
             job = job.among(&ground.bvh, around)?;
             figures = Some(around::figures(&terrain, ground, around, [0; 2]));
         }
-        let mut sensors = terrain.sensors(rise);
-        sensors.normals = job.normals();
+        // Rasters need no list of sensors, which is longer than all that is computed.
+        let are_rasters = |path| is_one_of(path, &["tif", "tiff", "asc", "npy"]);
+        let has_list = self.hourly.is_some() || self.groups.is_some() || self.albedo.is_some();
+        let mut sensors = Sensors::default();
+        if has_list || !self.output.iter().all(|path| are_rasters(path)) {
+            sensors = terrain.sensors(rise);
+            sensors.normals = job.normals();
+        }
         let build_seconds = start.elapsed().as_secs_f64();
         let done = match &town {
             _ if bake.is_whole() => self.whole(&job, &terrain.name)?,
@@ -402,7 +408,7 @@ impl SunArgs {
         };
         let seconds = [terrain.load_seconds, build_seconds];
         let directions = sunlight.suns.times.len() + sunlight.patches.len();
-        let answers = (directions * sensors.points.len()) as u64;
+        let answers = (directions * terrain.known) as u64;
         let own = town.as_ref().map(|(ground, _)| ground.mesh.indices.len());
         let triangles = own.unwrap_or_else(|| field.triangles());
         baked.end(bake, (triangles, answers, seconds, begin), &done)
@@ -431,6 +437,12 @@ impl SunArgs {
 }
 
 impl<'a> Baked<'a> {
+    /// Number of sensors, of which there is no list if only rasters are written.
+    fn number(&self) -> usize {
+        self.terrain
+            .map_or(self.sensors.points.len(), |terrain| terrain.known)
+    }
+
     /// Writes all files and the document, and says what was done: of so many rays, or answers without rays.
     fn end(
         mut self,
@@ -461,7 +473,7 @@ impl<'a> Baked<'a> {
             ("shard", &bake.shard()),
             ("triangles", &triangles),
             ("terrain", &self.around),
-            ("sensors", &sensors.points.len()),
+            ("sensors", &self.number()),
             ("place", &self.weather),
             ("latitude", &place.latitude),
             ("longitude", &place.longitude),

@@ -20,7 +20,7 @@ impl Baked<'_> {
         };
         tell(format_args!(
             "{} sensors, {} suns of {} steps at {:.4}, {:.4} and {zones}, {} patches",
-            count(self.sensors.points.len() as u64),
+            count(self.number() as u64),
             count(sunlight.suns.times.len() as u64),
             count(sunlight.steps() as u64),
             place.latitude,
