@@ -347,7 +347,8 @@ pub(crate) struct Lights<'a> {
 }
 
 /// Places in the sums of a sensor: hours, solid angles of the sky that are weighted by the cosine and as they are, and where irradiance
-/// is known the irradiation by the sun and by the sky in Wh/m². Then come twelve numbers each of the first and the last two, if months are wanted.
+/// is known the irradiation by the sun and by the sky in Wh/m². Then come twelve numbers each of the first and the last two, if months
+/// are wanted.
 const HOURS: usize = 0;
 const VIEW: usize = 1;
 const OPEN: usize = 2;
