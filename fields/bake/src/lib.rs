@@ -82,7 +82,6 @@
 //! - `sun`: `position`: where the sun is;  `sky`, `perez`: the sky in patches, and its light;  `moment`, `clock`, `epw`: dates, time
 //!   zones, weather files;  `sunlight`: the job of a period;  `surroundings`: scenes in terrain;  `exposure`, `hourly`, `measures`: sums, steps and classes
 //! - `rasters`: `viewshed`, `field_horizon`, `field_sun`: jobs of height rasters, which `antumbra-terrain` answers without rays;
-//!   `field_sky`: the sky that horizons leave open
 //! - `files`: `npz`: arrays for numpy;  `ply`, `glb`: meshes with a value at every vertex
 //! - `vector`, `orientation`: vectors, and where up and north are in a scene
 //! - `error`: why there is no result
@@ -98,7 +97,9 @@ mod sight;
 mod sun;
 mod vector;
 
-pub use antumbra_terrain::{Direction, HeightField, Lattice, Limits, Monitor, Observer};
+pub use antumbra_terrain::{
+    Direction, FieldSky, HeightField, Lattice, Limits, Monitor, Observer, SkyMeasure, SkyValues,
+};
 use antumbra_terrain::{Progress, memory};
 
 pub use error::Error;

@@ -7,6 +7,7 @@
 //! | how high is the horizon of each cell along a step between cells | [`Sweep::horizons`] | a number for each cell |
 //! | the same in any other azimuth | [`March::horizons`] | a number for each cell |
 //! | which azimuths have such steps, and how much of the circle is each | [`Lattice`] | steps, degrees, weights |
+//! | how much of the sky does each cell see | [`FieldSky`] | a number for each cell |
 //! | which cells get light from a direction | [`Shadows::lit`] | a bit for each cell |
 //! | is a light hidden at any place above the surface | [`Skyline::hides`] | yes or no |
 //! | which cells does an observer see | [`Viewer::sees`] | a bit for each cell |
@@ -35,7 +36,7 @@
 //! ```
 //!
 //! - `height_field`: heights as a surface of triangles;  `lattice`: steps and their azimuths
-//! - `sweep`, `march`: horizons;  `shadows`, `skyline`: light from far away;  `viewshed`: viewsheds
+//! - `sweep`, `march`: horizons;  `sky`: sums over them;  `shadows`, `skyline`: light from far away;  `viewshed`: viewsheds
 //! - `crossing`: crossings of lines of sight with edges
 //! - `angles`: degrees;  `monitor`: progress and cancellation;  `memory`: lists that may not fit;  `error`: why there is no result
 #![forbid(unsafe_code)]
@@ -51,6 +52,7 @@ mod march;
 pub mod memory;
 mod monitor;
 mod shadows;
+mod sky;
 mod skyline;
 mod sweep;
 mod viewshed;
@@ -64,6 +66,7 @@ pub use monitor::Monitor;
 #[doc(hidden)]
 pub use monitor::{Progress, Share};
 pub use shadows::{Shadows, per_cell};
+pub use sky::{FieldSky, SkyMeasure, SkyValues};
 pub use skyline::{Light, Skyline};
 pub use sweep::Sweep;
 pub use viewshed::{Limits, Viewer};

@@ -1115,6 +1115,14 @@ ANTUMBRA_API void antumbra_memory_free(uint8_t *bytes, size_t byte_count);
 /* Heights of cells, and where these are. */
 typedef struct antumbra_height_field antumbra_height_field;
 
+/* What of the sky is measured: the part of the light of an even sky that the surface of a cell receives (its sky view factor), the
+ * part of the hemisphere above that nothing hides, and the degrees from the zenith down to the horizon on average. */
+enum {
+    ANTUMBRA_SKY_VIEW = 0,
+    ANTUMBRA_SKY_OPEN = 1,
+    ANTUMBRA_SKY_OPENNESS = 2
+};
+
 /* Makes a height field of rows * columns heights, row by row, which are copied. NAN is no data. `transform` has 6 numbers in
  * the order of GDAL, and says where corners of cells are on the map: x = t[0] + column * t[1] + row * t[2], y = t[3] + column *
  * t[4] + row * t[5]. NULL stands for cells of 1 in rows from north to south.
@@ -1132,6 +1140,12 @@ ANTUMBRA_API antumbra_status antumbra_height_field_lattice(const antumbra_height
  * and 16 take the least time. */
 ANTUMBRA_API antumbra_status antumbra_height_field_horizons(const antumbra_height_field *field, double azimuth, double rise,
                                                             double drop, const antumbra_threads *threads, float *angles);
+
+/* Writes how open the sky is over each cell, summed over the horizons in the azimuths of a lattice of so many; NAN without data.
+ * Eyes are `rise` above their cells. `measure` is ANTUMBRA_SKY_VIEW, ANTUMBRA_SKY_OPEN or ANTUMBRA_SKY_OPENNESS. The sky ends at the
+ * horizontal, so nothing beyond the border of the field hides it. */
+ANTUMBRA_API antumbra_status antumbra_height_field_sky(const antumbra_height_field *field, size_t count, uint32_t measure,
+                                                       double rise, const antumbra_threads *threads, float *values);
 
 /* Writes which cells see lights far away: bytes 1 or 0, for each light all cells. A light is 2 doubles, its azimuth and its
  * elevation above the horizon in degrees, from -90 to 90. A light exactly on the horizon of a cell is hidden, and cells without

@@ -18,6 +18,7 @@
 
 #include <array>
 #include <atomic>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
@@ -1106,6 +1107,71 @@ public:
 private:
     explicit World(antumbra_world *handle) noexcept : handle_(handle) {}
     detail::Owned<antumbra_world, antumbra_world_free> handle_;
+};
+
+// Heights of the cells of a raster, and what these see: see 13 in antumbra.h.
+class HeightField {
+public:
+    using Transform = std::array<double, 6>;
+
+    // Rows of so many columns. NAN is no data.
+    HeightField(span<const double> heights, std::size_t columns, const Transform &transform = {0, 1, 0, 0, 0, -1})
+        : cells_(heights.size()) {
+        if (columns == 0 || heights.size() % columns != 0) {
+            throw Error(ANTUMBRA_INVALID_ARGUMENT, "the heights are not rows of so many columns");
+        }
+        antumbra_height_field *handle = nullptr;
+        check(antumbra_height_field_new(heights.data(), heights.size() / columns, columns, 0, transform.data(), &handle));
+        handle_.reset(handle);
+    }
+    std::size_t cells() const noexcept { return cells_; }
+    // Azimuths of a lattice, in degrees.
+    std::vector<double> lattice(std::size_t count) const {
+        std::vector<double> azimuths(count);
+        check(antumbra_height_field_lattice(handle_.get(), count, azimuths.data()));
+        return azimuths;
+    }
+    // Elevation of the horizon of each cell, in degrees.
+    std::vector<float> horizons(double azimuth, double rise = 0, double drop = 0, const Threads *threads = nullptr) const {
+        std::vector<float> angles(cells_);
+        check(antumbra_height_field_horizons(handle_.get(), azimuth, rise, drop, some(threads), angles.data()));
+        return angles;
+    }
+    // ANTUMBRA_SKY_VIEW and others, from a lattice of so many azimuths.
+    std::vector<float> sky(std::uint32_t measure, std::size_t azimuths = 16, double rise = 0,
+                           const Threads *threads = nullptr) const {
+        std::vector<float> values(cells_);
+        check(antumbra_height_field_sky(handle_.get(), azimuths, measure, rise, some(threads), values.data()));
+        return values;
+    }
+    // Which cells see lights, each an azimuth and an elevation in degrees: for each light all cells.
+    std::vector<std::uint8_t> lit(tuples<double, 2> lights, double rise = 0, const Threads *threads = nullptr) const {
+        std::vector<std::uint8_t> lit(lights.size() * cells_);
+        check(antumbra_height_field_lit(handle_.get(), lights.data(), lights.size(), lights.stride(), rise, some(threads),
+                                        lit.data()));
+        return lit;
+    }
+    // Height of the surface; NAN beside it.
+    double height(double x, double y) const {
+        double height = 0;
+        check(antumbra_height_field_height(handle_.get(), x, y, &height));
+        return height;
+    }
+    // Which cells an eye sees. Its z may be NAN for one on the surface.
+    std::vector<std::uint8_t> viewshed(const std::array<double, 3> &eye, double target = 0, double radius = HUGE_VAL,
+                                       double drop = 0, const Threads *threads = nullptr) const {
+        std::vector<std::uint8_t> seen(cells_);
+        check(antumbra_height_field_viewshed(handle_.get(), eye.data(), target, radius, drop, some(threads), seen.data()));
+        return seen;
+    }
+    const antumbra_height_field *get() const noexcept { return handle_.get(); }
+
+private:
+    static const antumbra_threads *some(const Threads *threads) noexcept {
+        return threads == nullptr ? nullptr : threads->get();
+    }
+    std::size_t cells_;
+    detail::Owned<antumbra_height_field, antumbra_height_field_free> handle_;
 };
 
 } // namespace antumbra

@@ -2,7 +2,8 @@
 
 use antumbra_terrain::angles::slope;
 use antumbra_terrain::{
-    Direction, Error, HeightField as Field, Lattice, Limits, March, Shadows, Sweep, Viewer, degrees,
+    Direction, Error, FieldSky, HeightField as Field, Lattice, Limits, March, Shadows, SkyMeasure,
+    Sweep, Viewer, degrees,
 };
 use rayon::prelude::*;
 
@@ -99,6 +100,35 @@ functions! {
         });
         let found = found?.into_iter();
         found.enumerate().for_each(|(cell, angle)| answers.set(cell, angle));
+        Ok(())
+    }
+
+    /// Writes how open the sky is over each cell, summed over the horizons in the azimuths of a lattice of so many; NAN without data.
+    /// Eyes are `rise` above their cells. `measure` is ANTUMBRA_SKY_VIEW, ANTUMBRA_SKY_OPEN or ANTUMBRA_SKY_OPENNESS. The sky ends at the
+    /// horizontal, so nothing beyond the border of the field hides it.
+    fn antumbra_height_field_sky(
+        field: &HeightField, count: usize, measure: u32, rise: f64, threads: Place<'_>, values: *mut f32,
+    ) {
+        // SAFETY: the header says what is at this address.
+        let answers = unsafe { field.answers(values, 1, "values") }?;
+        let measure = match measure {
+            0 => SkyMeasure::View,
+            1 => SkyMeasure::Open,
+            2 => SkyMeasure::Openness,
+            other => return Err(Failure::argument(format_args!("`measure` is {other}, and at most 2"))),
+        };
+        let (field, drop) = (&field.field()?, 0.0);
+        let steps = Lattice::new(field, count)?.steps;
+        let directions: Vec<Direction> = steps.iter().copied().map(Direction::Step).collect();
+        let found = threads.run(|| {
+            let mut sky = FieldSky::new(field, &directions, measure)?;
+            for (index, &step) in steps.iter().enumerate() {
+                sky.add(index, &Sweep { field, rise, drop }.horizons(step, degrees, &())?);
+            }
+            Ok::<_, Error>(sky.finish().values)
+        });
+        let found = found?.into_iter();
+        found.enumerate().for_each(|(cell, value)| answers.set(cell, value));
         Ok(())
     }
 

@@ -1,4 +1,4 @@
-/* Height fields: horizons, light and viewsheds, against closed forms and brute force along rows. */
+/* Height fields: horizons, sky, light and viewsheds, against closed forms and brute force along rows. */
 #include "check.h"
 
 enum { ROWS = 40, COLUMNS = 70, CELLS = ROWS * COLUMNS };
@@ -37,6 +37,35 @@ static void horizons_and_light(const antumbra_height_field *field, const double 
     }
     antumbra_threads_free(threads);
     free(angles), free(walked), free(lit);
+}
+
+/* The openness is the mean of the angles from the zenith to the horizons, and an even plane sees all of the sky. */
+static void sky(const antumbra_height_field *field) {
+    double azimuths[8], even[6] = {5, 5, 5, 5, 5, 5}, *sums = calloc(CELLS, sizeof *sums);
+    float *angles = malloc(CELLS * sizeof *angles), *values = malloc(CELLS * sizeof *values);
+    antumbra_height_field *plane;
+    uint32_t measure;
+    int cell, index;
+    OK(antumbra_height_field_lattice(field, 8, azimuths));
+    for (index = 0; index < 8; ++index) {
+        OK(antumbra_height_field_horizons(field, azimuths[index], 0.5, 0.0, NULL, angles));
+        for (cell = 0; cell < CELLS; ++cell) {
+            sums[cell] += (90.0 - (angles[cell] == -90.0f ? 0.0 : angles[cell])) / 8.0;
+        }
+    }
+    OK(antumbra_height_field_sky(field, 8, ANTUMBRA_SKY_OPENNESS, 0.5, NULL, values));
+    for (cell = 0; cell < CELLS; ++cell) {
+        CHECK(fabs(values[cell] - sums[cell]) < 1e-4);
+    }
+    OK(antumbra_height_field_new(even, 2, 3, 0, NULL, &plane));
+    for (measure = 0; measure < 3; ++measure) {
+        OK(antumbra_height_field_sky(plane, 16, measure, 0.0, NULL, values));
+        for (cell = 0; cell < 6; ++cell) {
+            CHECK(fabs(values[cell] - (measure == ANTUMBRA_SKY_OPENNESS ? 90.0 : 1.0)) < 1e-6);
+        }
+    }
+    antumbra_height_field_free(plane);
+    free(sums), free(angles), free(values);
 }
 
 /* What an eye above a cell sees of its row, to both sides. */
@@ -114,6 +143,9 @@ static void mistakes(void) {
     WRONG(antumbra_height_field_horizons(NULL, 0.0, 0.0, 0.0, NULL, angles), "`field` is null");
     WRONG(antumbra_height_field_horizons(field, NAN, 0.0, 0.0, NULL, angles), "azimuth: found NaN");
     WRONG(antumbra_height_field_horizons(field, 0.0, 0.0, 0.0, NULL, NULL), "`angles` is null");
+    WRONG(antumbra_height_field_sky(field, 12, ANTUMBRA_SKY_VIEW, 0.0, NULL, angles), "azimuths of a lattice: found 12");
+    WRONG(antumbra_height_field_sky(field, 8, 3, 0.0, NULL, angles), "`measure` is 3");
+    WRONG(antumbra_height_field_sky(field, 8, ANTUMBRA_SKY_OPEN, 0.0, NULL, NULL), "`values` is null");
     WRONG(antumbra_height_field_lit(field, lights, 1, 0, 0.0, NULL, bytes), "slope: found NaN");
     WRONG(antumbra_height_field_lit(field, NULL, 1, 0, 0.0, NULL, bytes), "`lights` is null");
     WRONG(antumbra_height_field_lit(field, lights, SIZE_MAX / 8, 0, 0.0, NULL, bytes), "more than any memory");
@@ -140,6 +172,7 @@ int main(void) {
     }
     OK(antumbra_height_field_new(heights, ROWS, COLUMNS, 0, transform, &field));
     horizons_and_light(field, heights);
+    sky(field);
     viewsheds(field, heights);
     antumbra_height_field_free(field);
     walls();

@@ -113,8 +113,28 @@ static void curves() {
     CHECK(antumbra::Scene().add_curves(std::vector<std::array<float, 4>>{}) == 0);
 }
 
+// A wall of 2 m in the east of a plain.
+static void fields() {
+    const std::vector<double> heights = {0, 0, 0, 2, 0, 0, 0, 2};
+    antumbra::HeightField field(heights, 4, {0, 1, 0, 0, 0, -1});
+    antumbra::Threads threads(2);
+    CHECK(field.cells() == 8 && field.lattice(8)[2] == 90 && field.height(3.5, -0.5) == 2);
+    CHECK(field.horizons(90)[2] > 63 && field.horizons(90, 0, 0, &threads)[1] == 45);
+    const double suns[] = {90, 50, 90, 60};
+    CHECK(field.lit(suns) == (std::vector<std::uint8_t>{1, 1, 0, 1, 1, 1, 0, 1, 1, 1, 0, 1, 1, 1, 0, 1}));
+    const auto view = field.sky(ANTUMBRA_SKY_VIEW), open = field.sky(ANTUMBRA_SKY_OPEN, 32);
+    CHECK(view[0] > view[2] && open[0] > open[2] && open[0] < 1);
+    CHECK(field.viewshed({0.5, -0.5, 1}) == std::vector<std::uint8_t>(8, 1));
+    CHECK(field.viewshed({0.5, -0.5, NAN}, 0, 1.5)[7] == 0);
+    antumbra::HeightField moved = std::move(field);
+    CHECK(moved.horizons(270)[0] == -90);
+    CHECK(failure([&] { antumbra::HeightField(heights, 3); }) == ANTUMBRA_INVALID_ARGUMENT);
+    CHECK(failure([&] { moved.sky(9); }) == ANTUMBRA_INVALID_ARGUMENT);
+}
+
 int main(int argc, char **argv) {
     curves();
+    fields();
     CHECK(argc == 2);
     std::mt19937 random(5);
     std::uniform_real_distribution<float> unit(-1, 1);

@@ -1,11 +1,10 @@
 //! How much of the sky the cells of height fields see, by their horizons.
 
 use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
-use antumbra_terrain::angles::sin_cos_degrees;
-use antumbra_terrain::{Direction, HeightField, degrees, weights};
 use rayon::prelude::*;
 
-use crate::{Error, memory};
+use crate::angles::sin_cos_degrees;
+use crate::{Direction, Error, HeightField, degrees, memory, weights};
 
 /// What of the sky [`FieldSky`] measures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +19,7 @@ pub enum SkyMeasure {
     Openness,
 }
 
-/// A measure of the sky that each cell of a height field sees, summed over the horizons of [`FieldHorizonJob`](crate::FieldHorizonJob).
+/// A measure of the sky that each cell of a height field sees, summed over its horizons.
 ///
 /// The sky ends at the horizontal. So a direction without any surface ahead, such as at the border, has its horizon at 0 degrees, and
 /// only the openness counts horizons below that.
@@ -68,7 +67,7 @@ impl<'a> FieldSky<'a> {
     ) -> Result<Self, Error> {
         let count = directions.len();
         let wanted = "at least 1";
-        antumbra_terrain::Error::check_range("directions", count as f64, count > 0, wanted)?;
+        Error::check_range("directions", count as f64, count > 0, wanted)?;
         let [width, height] = field.size();
         let mut rises = memory::room("slopes", width * height)?;
         let rise = |cell: usize| match field.normal([cell % width, cell / width]) {
@@ -95,8 +94,8 @@ impl<'a> FieldSky<'a> {
         (field.heights().len() * bytes) as u64
     }
 
-    /// Adds the horizons of all cells in the direction of this number, in degrees as of
-    /// [`FieldHorizonJob::plane`](crate::FieldHorizonJob::plane). Each direction is added once, and their order decides the last bits.
+    /// Adds the horizons of all cells in the direction of this number, such as
+    /// [`Sweep::horizons`](crate::Sweep::horizons) makes of [`degrees`]. Each direction is added once, and their order decides the last bits.
     ///
     /// # Panics
     /// If there is no such direction, or the horizons are not as many as cells.
