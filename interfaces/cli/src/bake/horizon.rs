@@ -170,7 +170,7 @@ impl Baking for HorizonArgs {
             }
             places::check_raster(path, &self.places, &self.scene)?;
             let is_one = self.azimuths() == Azimuths::Even(1) || self.show != Shown::Angles;
-            if !(is_one || self.places.vertices && has_planes(path)) {
+            if !(is_one || self.is_of_cells() && has_planes(path)) {
                 let reason = "a raster has one azimuth: --azimuths 1 with --first; .npz and .npy of cells have all";
                 return Err(Failure::name(path, reason));
             }

@@ -101,10 +101,10 @@ fn horizons_by_rays_and_of_cells_agree_and_shares_change_no_byte() {
         let said = run.expect(2).stderr;
         assert!(said.contains(words), "{said}");
     }
-    // A raster has one azimuth.
-    place
-        .run(&[&cells[..], &["-o", "a.tif"]].concat())
-        .expect(2);
+    // A raster has one azimuth, and so has one of sensors that rays answer.
+    for more in [&["-o", "a.tif"][..], &["--up", "y", "-o", "a.npy"]] {
+        place.run(&[&cells[..], more].concat()).expect(2);
+    }
     let one = [
         "horizon",
         "wall.asc",
