@@ -20,10 +20,14 @@ pub fn atomic_write(
 }
 
 /// As [`atomic_write`], for writers that go back, as formats with tables at the front need.
-pub(crate) fn atomic_write_seeking(
-    path: &Path,
+///
+/// # Errors
+/// As [`atomic_write`].
+pub fn atomic_write_seeking(
+    path: impl AsRef<Path>,
     write: impl FnOnce(&mut dyn Output) -> io::Result<()>,
 ) -> Result<(), Error> {
+    let path = path.as_ref();
     write_file_seeking(path, write).map_err(|source| failed(path, source))
 }
 

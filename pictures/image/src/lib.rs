@@ -32,7 +32,7 @@
 //! - `display.rs`: [`Display`], exposure and tone curves
 //! - `foreign.rs`: protection against panics in decoders of other crates
 //! - `memory.rs`: [`Allowance`], memory that pictures may take
-//! - `atomic.rs`: [`atomic_write`], which replaces a file as a whole or not at all
+//! - `atomic.rs`: [`atomic_write`] and [`atomic_write_seeking`], which replace a file as a whole or not at all
 //! - `signature.rs`: the mark of this program in its pictures
 //! - `compare.rs`: error measures and the statistical test against a reference
 //! - `palette.rs`: [`palette`], the colours of all maps
@@ -67,7 +67,7 @@ mod signature;
 mod window;
 
 pub use antumbra_files::{Target, probe, remove_leftovers};
-pub use atomic::atomic_write;
+pub use atomic::{atomic_write, atomic_write_seeking};
 pub use channels::{Channel, Notes};
 pub use display::{Display, Tonemap};
 pub use error::Error;
