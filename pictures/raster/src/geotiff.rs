@@ -1,23 +1,20 @@
-//! GeoTIFF: the crate `tiff` reads tags and writes files, tags of places are ours (OGC 19-008r4, GeoTIFF 1.1).
+//! Reading GeoTIFF: the crate `tiff` reads tags, and tags of places are ours (OGC 19-008r4, GeoTIFF 1.1).
 
 use std::io::{Cursor, Read, Seek};
 
 use tiff::Directory;
 use tiff::decoder::ifd::Value;
 use tiff::decoder::{Decoder, Limits};
-use tiff::encoder::colortype::Gray32Float;
-use tiff::encoder::compression::DeflateLevel;
-use tiff::encoder::{Compression, TiffEncoder};
 use tiff::tags::Tag;
 
 use crate::crs::US_FOOT;
 use crate::grid::check_transform;
 use crate::npy::WorldFile;
 use crate::pixels::{Bytes, Page};
-use crate::{Crs, Grid, Memory, Quantity, Raster};
+use crate::{Crs, Grid, Raster};
 
 /// Notes of GDAL as XML: scale and offset of values, their names and units.
-const GDAL_METADATA: u16 = 42_112;
+pub const GDAL_METADATA: u16 = 42_112;
 
 /// What may lie beside a file.
 pub struct Beside<'a> {
@@ -254,65 +251,13 @@ fn unit_of_heights(notes: &str) -> Option<f64> {
     }
 }
 
-/// Writes one band.
-pub fn write(grid: &Grid, values: &[f32], quantity: Quantity<'_>) -> Result<Vec<u8>, String> {
-    let mut bytes = Cursor::new(Vec::new());
-    encode(&mut bytes, grid, values, quantity).map_err(|error| error.to_string())?;
-    Ok(bytes.into_inner())
-}
-
-fn encode(
-    bytes: &mut Memory<Vec<u8>>,
-    grid: &Grid,
-    values: &[f32],
-    Quantity { name, unit }: Quantity<'_>,
-) -> tiff::TiffResult<()> {
-    let deflate = Compression::Deflate(DeflateLevel::Balanced);
-    let mut encoder = TiffEncoder::new(bytes)?.with_compression(deflate);
-    let mut image = encoder.new_image::<Gray32Float>(grid.width as u32, grid.height as u32)?;
-    let [x, a, b, y, d, e] = grid.transform;
-    let is_point = grid.crs.as_ref().is_some_and(Crs::is_point);
-    let [x, y] = match is_point {
-        true => [x + 0.5 * (a + b), y + 0.5 * (d + e)],
-        false => [x, y],
-    };
-    let tags = image.encoder();
-    if a > 0.0 && e < 0.0 && b == 0.0 && d == 0.0 {
-        tags.write_tag(Tag::ModelPixelScaleTag, &[a, -e, 0.0][..])?;
-        tags.write_tag(Tag::ModelTiepointTag, &[0.0, 0.0, 0.0, x, y, 0.0][..])?;
-    } else {
-        let matrix = [
-            [a, b, 0.0, x],
-            [d, e, 0.0, y],
-            [0.0; 4],
-            [0.0, 0.0, 0.0, 1.0],
-        ];
-        tags.write_tag(Tag::ModelTransformationTag, matrix.as_flattened())?;
-    }
-    if let Some(crs) = &grid.crs {
-        tags.write_tag(Tag::GeoKeyDirectoryTag, &crs.directory[..])?;
-        if !crs.doubles.is_empty() {
-            tags.write_tag(Tag::GeoDoubleParamsTag, &crs.doubles[..])?;
-        }
-        if !crs.names.is_empty() {
-            tags.write_tag(Tag::GeoAsciiParamsTag, &crs.names[..])?;
-        }
-    }
-    let mut notes = format!(
-        "<GDALMetadata>\n<Item name=\"DESCRIPTION\" sample=\"0\" role=\"description\">{name}</Item>\n"
-    );
-    if !unit.is_empty() {
-        notes += &format!("<Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">{unit}</Item>\n");
-    }
-    notes += "</GDALMetadata>";
-    tags.write_tag(Tag::Unknown(GDAL_METADATA), &notes[..])?;
-    tags.write_tag(Tag::GdalNodata, "nan")?;
-    image.write_data(values)
-}
-
 #[cfg(test)]
 mod tests {
+    use tiff::encoder::TiffEncoder;
+    use tiff::encoder::colortype::Gray32Float;
+
     use super::*;
+    use crate::Quantity;
 
     const HOURS: Quantity<'_> = Quantity {
         name: "hours",
@@ -346,7 +291,8 @@ mod tests {
                     transform,
                     crs: crs.clone(),
                 };
-                let bytes = write(&grid, &values, HOURS).expect("a file");
+                let bytes =
+                    crate::write("a.tif".as_ref(), &grid, &values, &[HOURS]).expect("a file");
                 let raster = Raster::from_geotiff(&bytes).expect("a raster");
                 assert_eq!(raster.grid, grid);
                 assert!(raster.values[2].is_nan());
@@ -370,7 +316,7 @@ mod tests {
     #[test]
     fn files_without_a_place_and_damaged_ones_are_refused() {
         let grid = Grid::north_up([2, 2], [0.0; 2], 1.0);
-        let bytes = write(&grid, &[0.0; 4], HOURS).expect("a file");
+        let bytes = crate::write("a.tif".as_ref(), &grid, &[0.0; 4], &[HOURS]).expect("a file");
         for cut in 0..bytes.len() {
             let _ = Raster::from_geotiff(&bytes[..cut]);
         }

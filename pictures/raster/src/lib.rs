@@ -18,10 +18,12 @@
 //!
 //! - `grid`: where the cells are;  `mesh`: cells as triangles
 //! - `mosaic`: several files as one raster;  `vrt`: those that a .vrt names
-//! - `geotiff`, `asc`, `npy`: one format each;  `pixels`: strips and tiles of a TIFF;   `crs`: coordinate systems as GeoTIFF describes them
+//! - `geotiff`, `asc`, `npy`: one format each;  `pixels`: strips and tiles of a TIFF;  `cog`: GeoTIFFs that are written
+//! - `crs`: coordinate systems as GeoTIFF describes them
 #![forbid(unsafe_code)]
 
 mod asc;
+mod cog;
 mod crs;
 mod geotiff;
 mod grid;
@@ -31,13 +33,15 @@ mod npy;
 mod pixels;
 mod vrt;
 
+use std::borrow::Cow;
 use std::cell::Cell;
 use std::fs::{self, File};
-use std::io::{self, BufReader, Cursor, Read, Write};
+use std::io::{self, BufReader, Cursor, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use tiff::decoder::Decoder;
 
+use cog::Cog;
 pub use crs::{Crs, Site, unit_name};
 use geotiff::Beside;
 pub use grid::{Grid, RasterCells};
@@ -242,65 +246,85 @@ pub struct Quantity<'a> {
     pub unit: &'a str,
 }
 
-/// Writes planes of values of all cells as a `.npy`, `[planes, height, width]`, one after the other: only one is in memory.
+/// Writes planes of values of all cells one after the other, so that only one is in memory: a band each of a `.tif`, or a `.npy`,
+/// `[planes, height, width]`. The file is written from its start on. NaN is no data, and `bands` has a name and a unit for each plane.
 ///
 /// # Errors
-/// All of the file, and of `plane`, which makes each of them.
+/// All of the file, and of `plane`, which makes each of them; other formats, and grids and bands that the format cannot hold.
 ///
 /// # Panics
 /// If a plane has not as many values as there are cells.
-pub fn write_planes(
-    file: &mut dyn Write,
+///
+/// # Example
+/// ```
+/// use std::borrow::Cow;
+/// use std::io::Cursor;
+///
+/// use antumbra_raster::{Grid, Quantity, Raster, write_planes};
+///
+/// let grid = Grid::north_up([600, 400], [600_000.0, 5_340_000.0], 10.0);
+/// let band = |name| Quantity { name, unit: "degrees" };
+/// let mut file = Cursor::new(Vec::new());
+/// let bands = [band("horizon_000"), band("horizon_090")];
+/// write_planes("angles.tif".as_ref(), &mut file, &grid, &bands, &mut |plane| {
+///     Ok(Cow::Owned(vec![plane as f32; 600 * 400]))
+/// })?;
+/// assert_eq!(file.get_ref()[..4], *b"II\x2a\0");
+/// # Ok::<(), std::io::Error>(())
+/// ```
+pub fn write_planes<'a>(
+    path: &Path,
+    file: &mut (impl Write + Seek + ?Sized),
     grid: &Grid,
-    planes: usize,
-    plane: &mut dyn FnMut(usize) -> io::Result<Vec<f32>>,
+    bands: &[Quantity<'_>],
+    plane: &mut dyn FnMut(usize) -> io::Result<Cow<'a, [f32]>>,
 ) -> io::Result<()> {
-    file.write_all(&npy::head(grid, planes))?;
-    for index in 0..planes {
-        let values = plane(index)?;
-        assert_eq!(values.len(), grid.width * grid.height, "one value per cell");
-        for values in values.chunks(1 << 14) {
-            let bytes: Vec<u8> = values
-                .iter()
-                .flat_map(|value| value.to_le_bytes())
-                .collect();
-            file.write_all(&bytes)?;
+    match extension(path).as_str() {
+        "npy" => npy::write(file, grid, bands.len(), plane),
+        "tif" | "tiff" => Cog::new(grid, bands)?.write(file, plane),
+        other => {
+            let reason = format!("`{other}` is no extension of a raster of several planes");
+            Err(io::Error::new(io::ErrorKind::InvalidInput, reason))
         }
     }
-    Ok(())
 }
 
-/// Values of the cells of a grid as the bytes of a file; NaN is no data. Where cells have several values, they come plane by plane.
+/// Values of the cells of a grid as the bytes of a file; NaN is no data. Where cells have several values, they come plane by plane,
+/// and `bands` has a name and a unit for each plane.
 ///
 /// | format | holds |
 /// |---|---|
-/// | `.tif`, `.tiff` | one band of 32-bit floats, deflated, with the georeference, name and unit |
-/// | `.asc` | an ESRI ASCII grid; cells must be squares with rows from north to south |
+/// | `.tif`, `.tiff` | a cloud optimised GeoTIFF: a band of 32-bit floats for each plane in deflated tiles, the georeference, names and units, and overviews by halves, whose cells are means of the cells with data |
+/// | `.asc` | an ESRI ASCII grid of one plane; cells must be squares with rows from north to south |
 /// | `.npy` | `[height, width]` of 32-bit floats, or `[planes, height, width]`, without a georeference |
+///
+/// A `.tif` of more than 4 GB is a BigTIFF.
 ///
 /// # Errors
 /// [`Error::Unwritable`] if the format cannot hold the grid.
 ///
 /// # Panics
-/// If there are not as many values as cells, or a multiple.
+/// If there are not as many values as cells for each band.
 pub fn write(
     path: &Path,
     grid: &Grid,
     values: &[f32],
-    quantity: Quantity<'_>,
+    bands: &[Quantity<'_>],
 ) -> Result<Vec<u8>, Error> {
     let cells = grid.width * grid.height;
-    assert!(
-        values.len() == cells || values.len() > cells && values.len().is_multiple_of(cells),
-        "values for each cell"
-    );
+    assert_eq!(values.len(), bands.len() * cells, "values for each cell");
     let written = match extension(path).as_str() {
-        "npy" => Ok(npy::write(grid, values)),
-        "tif" | "tiff" | "asc" if values.len() > cells => {
-            Err("it has one value for each cell; .npy has several".into())
+        "asc" if bands.len() > 1 => {
+            Err("it has one value for each cell; .tif and .npy have several".into())
         }
-        "tif" | "tiff" => geotiff::write(grid, values, quantity),
         "asc" => asc::write(grid, values),
+        "npy" | "tif" | "tiff" => {
+            let mut plane = |band: usize| Ok(Cow::Borrowed(&values[band * cells..][..cells]));
+            let mut file = Memory::new(Vec::new());
+            let written = write_planes(path, &mut file, grid, bands, &mut plane);
+            let bytes = written.map(|()| file.into_inner());
+            bytes.map_err(|error| error.to_string())
+        }
         other => Err(format!("`{other}` is no extension of a raster")),
     };
     written.map_err(|reason| Error::Unwritable {

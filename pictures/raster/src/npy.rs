@@ -1,5 +1,8 @@
 //! Arrays of numpy (.npy), version 1 to 3 of the format.
 
+use std::borrow::Cow;
+use std::io::{self, Write};
+
 use crate::grid::check_transform;
 use crate::{Grid, Raster};
 
@@ -130,7 +133,7 @@ fn numbers(kind: &str, data: &[u8], count: usize) -> Result<Vec<f64>, String> {
 }
 
 /// What is before the numbers of an array of 32-bit floats; of three dimensions if there are several planes of values.
-pub fn head(grid: &Grid, planes: usize) -> Vec<u8> {
+fn head(grid: &Grid, planes: usize) -> Vec<u8> {
     let (height, width) = (grid.height, grid.width);
     let planes = match planes {
         0 | 1 => String::new(),
@@ -148,11 +151,23 @@ pub fn head(grid: &Grid, planes: usize) -> Vec<u8> {
     [MAGIC, &[1, 0], &length, head.as_bytes()].concat()
 }
 
-/// Writes an array of 32-bit floats; of three dimensions if there are several values for each cell, plane by plane.
-pub fn write(grid: &Grid, values: &[f32]) -> Vec<u8> {
-    let mut bytes = head(grid, values.len() / (grid.height * grid.width).max(1));
-    bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
-    bytes
+/// Writes planes of 32-bit floats, which `plane` makes one after the other.
+pub fn write<'a>(
+    file: &mut (impl Write + ?Sized),
+    grid: &Grid,
+    planes: usize,
+    plane: &mut dyn FnMut(usize) -> io::Result<Cow<'a, [f32]>>,
+) -> io::Result<()> {
+    file.write_all(&head(grid, planes))?;
+    for index in 0..planes {
+        let values = plane(index)?;
+        assert_eq!(values.len(), grid.width * grid.height, "one value per cell");
+        for values in values.chunks(1 << 14) {
+            let bytes = values.iter().flat_map(|value| value.to_le_bytes());
+            file.write_all(&bytes.collect::<Vec<u8>>())?;
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -176,7 +191,9 @@ mod tests {
         let place: WorldFile<'_> = &|| Ok(Some(PLACE));
         let values = [1.0, 2.0, f32::NAN, 4.0, 5.0, 6.0];
         let grid = Grid::north_up([3, 2], [0.0, 2.0], 1.0);
-        let raster = read(&write(&grid, &values), place, |_| Ok(())).expect("a raster");
+        let mut file = Vec::new();
+        write(&mut file, &grid, 1, &mut |_| Ok(values.as_slice().into())).expect("a file");
+        let raster = read(&file, place, |_| Ok(())).expect("a raster");
         assert_eq!(raster.grid, grid);
         assert_eq!((raster.values[1], raster.values[5]), (2.0, 6.0));
         assert!(raster.values[2].is_nan());

@@ -49,7 +49,7 @@ fn cut(all: &Raster, [column, row]: [usize; 2], [width, height]: [usize; 2]) -> 
 fn save(path: &Path, raster: &Raster) {
     let values: Vec<f32> = raster.values.iter().map(|&value| value as f32).collect();
     let quantity = Quantity { name: "", unit: "" };
-    let bytes = write(path, &raster.grid, &values, quantity).expect("a raster");
+    let bytes = write(path, &raster.grid, &values, &[quantity]).expect("a raster");
     fs::write(path, bytes).expect("a file");
 }
 

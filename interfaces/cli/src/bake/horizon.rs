@@ -9,7 +9,7 @@ use antumbra_bake::{
     Array, Direction, Entry, FieldHorizonJob, FieldSky, HeightField, HorizonJob, Lattice,
     Orientation, Sensors, SkyMeasure, SkyValues,
 };
-use antumbra_image::atomic_write;
+use antumbra_image::atomic_write_seeking;
 use antumbra_lab::count;
 use antumbra_raster::{Grid, Quantity};
 use antumbra_terrain::Share;
@@ -74,8 +74,9 @@ pub struct HorizonArgs {
     /// Result: .csv, .npz or .tif
     ///
     /// May be given several times. A .csv has a line per sensor and a column per azimuth, such as horizon_090. An .npz has the
-    /// array horizon, sensors x azimuths, with azimuths and points. A .tif (GeoTIFF), .asc or .npy has one azimuth (--azimuths 1) in
-    /// the cells of a --grid or of a scene that is a raster, or the value of --show. A shard is a .part.
+    /// array horizon, sensors x azimuths, with azimuths and points. A .tif (GeoTIFF) has a band, and a .npy a plane, for each azimuth of
+    /// the --cells of a raster, or the value of --show. An .asc, or a raster of a --grid, has one azimuth (--azimuths 1). A shard is a
+    /// .part.
     #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
     /// Angles, or how open the sky is
@@ -171,7 +172,7 @@ impl Baking for HorizonArgs {
             places::check_raster(path, &self.places, &self.scene)?;
             let is_one = self.azimuths() == Azimuths::Even(1) || self.show != Shown::Angles;
             if !(is_one || self.is_of_cells() && has_planes(path)) {
-                let reason = "a raster has one azimuth: --azimuths 1 with --first; .npz and .npy of cells have all";
+                let reason = "an .asc, or a raster of a --grid, has one azimuth: --azimuths 1 with --first; .tif, .npy and .npz of --cells have all";
                 return Err(Failure::name(path, reason));
             }
         }
@@ -219,9 +220,8 @@ impl Baking for HorizonArgs {
         let done = bake.compute(&job, &ground, &ground.bvh)?;
         let place = (self.raster.crs.as_ref(), self.places.units.metres());
         let rows = (sensors, ground.local, done.found.as_deref());
-        horizon.write(bake, rows, |path, angles| {
-            let quantity = Shown::Angles.quantity();
-            raster::write(path, &ground, (sensors, angles), place, (up, quantity))
+        horizon.write(bake, rows, |path, angles, bands| {
+            raster::write(path, &ground, (sensors, angles), place, (up, bands[0]))
         })?;
         let all = Sum::of(done.found.as_deref());
         horizon.end(bake, (all, None), &done, || ground.tell(""))
@@ -287,15 +287,15 @@ fn of_cells(args: &HorizonArgs, bake: &Bake<'_>, mut files: Files) -> Result<(),
     let all = Sum::of(found.as_deref());
     let sensors = terrain.sensors(0.0);
     let rows = (&sensors, terrain.local(), found.as_deref());
-    horizon.write(bake, rows, |path, _| {
-        raster::write_values(path, &grid, planes, args.show.quantity())
+    horizon.write(bake, rows, |path, _, bands| {
+        raster::write_values(path, &grid, planes, bands)
     })?;
     horizon.end(bake, (all, quadrature_error), &done, || ())
 }
 
 /// Whether a file has all azimuths as planes of cells.
 fn has_planes(path: &Path) -> bool {
-    is_one_of(path, &["npy"])
+    is_one_of(path, &["npy", "tif", "tiff"])
 }
 
 /// A horizon of sensors in some azimuths.
@@ -337,8 +337,9 @@ impl Horizon<'_> {
         check_room(path, 4 * (planes * grid.width * grid.height) as u64)?;
         let progress = Progress::new(self.name);
         let (mut all, mut failure) = (Sum::default(), None);
-        let written = atomic_write(path, |file| {
-            antumbra_raster::write_planes(file, grid, planes, &mut |index| {
+        let names = self.names();
+        let written = atomic_write_seeking(path, |file| {
+            antumbra_raster::write_planes(path, file, grid, &self.bands(&names), &mut |index| {
                 let plane = job.plane(index, &Share(&progress, [index, planes]));
                 let plane = plane.map_err(|error| {
                     failure = Some(error);
@@ -346,7 +347,7 @@ impl Horizon<'_> {
                 })?;
                 let Sum(sum, number) = Sum::of(Some(&plane));
                 all = Sum(all.0 + sum, all.1 + number);
-                Ok(plane)
+                Ok(plane.into())
             })
         });
         progress.finish();
@@ -382,33 +383,45 @@ impl Horizon<'_> {
         }
     }
 
+    /// Names of the values of each sensor.
+    fn names(&self) -> Vec<String> {
+        match self.show {
+            Shown::Angles => self.azimuths.iter().map(column_name).collect(),
+            show => vec![show.quantity().name.to_owned()],
+        }
+    }
+
+    /// The values of each sensor with their unit.
+    fn bands<'a>(&self, names: &'a [String]) -> Vec<Quantity<'a>> {
+        let unit = self.show.quantity().unit;
+        names.iter().map(|name| Quantity { name, unit }).collect()
+    }
+
     /// Writes all outputs of values, which are `None` for a shard; `raster` those that are rasters.
     fn write(
         &self,
         bake: &Bake<'_>,
         (sensors, local, values): (&Sensors, LocalOrigin, Option<&[f32]>),
-        raster: impl Fn(&Path, &[f32]) -> Result<(), Failure>,
+        raster: impl Fn(&Path, &[f32], &[Quantity<'_>]) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let Some(values) = values else {
             return Ok(());
         };
         let _writing = interrupt::writing();
         let (Quantity { name, unit }, width) = (self.show.quantity(), self.width());
+        let names = self.names();
         bake.outputs
             .iter()
             .try_for_each(|path| match Format::of_sensors(path)? {
                 Format::Csv => {
-                    let names: Vec<String> = match self.show {
-                        Shown::Angles => self.azimuths.iter().map(column_name).collect(),
-                        _ => vec![name.to_owned()],
-                    };
                     let steps = if unit.is_empty() { 1e6 } else { 1e4 };
-                    let column = |(at, name)| {
+                    let column = |(at, name): (usize, &String)| {
                         let value = move |row: usize| f64::from(values[row * width + at]);
-                        Column::new(name, move |row| (value(row) * steps).round() / steps)
+                        Column::new(name.as_str(), move |row| {
+                            (value(row) * steps).round() / steps
+                        })
                     };
-                    let columns: Vec<Column<'_>> =
-                        names.into_iter().enumerate().map(column).collect();
+                    let columns: Vec<Column<'_>> = names.iter().enumerate().map(column).collect();
                     files::table(path, (sensors, &sensors.normals, local), &[], &columns)
                 }
                 Format::Npz => {
@@ -419,7 +432,7 @@ impl Horizon<'_> {
                     ];
                     files::npz(path, &entries)
                 }
-                _ => raster(path, values),
+                _ => raster(path, values, &self.bands(&names)),
             })
     }
 

@@ -63,17 +63,17 @@ pub fn write_cells(
     values: &[f32],
     quantity: Quantity<'_>,
 ) -> Result<(), Failure> {
-    write_values(path, &all.grid, &all.spread(values), quantity)
+    write_values(path, &all.grid, &all.spread(values), &[quantity])
 }
 
-/// Writes values of all cells of a raster.
+/// Writes values of all cells of a raster, plane by plane.
 pub fn write_values(
     path: &Path,
     grid: &Grid,
     values: &[f32],
-    quantity: Quantity<'_>,
+    bands: &[Quantity<'_>],
 ) -> Result<(), Failure> {
-    let bytes = antumbra_raster::write(path, grid, values, quantity);
+    let bytes = antumbra_raster::write(path, grid, values, bands);
     let bytes = bytes.map_err(|error| Failure::Usage(error.to_string()))?;
     output::check_room(path, bytes.len() as u64)?;
     Ok(atomic_write(path, |file| file.write_all(&bytes))?)

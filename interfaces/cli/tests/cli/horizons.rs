@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use antumbra_raster::Quantity;
+
 use crate::support::Place;
 
 #[test]
@@ -101,9 +103,33 @@ fn horizons_by_rays_and_of_cells_agree_and_shares_change_no_byte() {
         let said = run.expect(2).stderr;
         assert!(said.contains(words), "{said}");
     }
-    // A raster has one azimuth, and so has one of sensors that rays answer.
-    for more in [&["-o", "a.tif"][..], &["--up", "y", "-o", "a.npy"]] {
-        place.run(&[&cells[..], more].concat()).expect(2);
+    // An .asc has one azimuth, and so has a raster of sensors that rays answer.
+    let on_its_side = ["--up", "y", "-o", "a.npy"];
+    for more in [&["-o", "a.asc"][..], &on_its_side] {
+        let said = place.run(&[&cells[..], more].concat()).expect(2).stderr;
+        let words =
+            "has one azimuth: --azimuths 1 with --first; .tif, .npy and .npz of --cells have all";
+        assert!(said.contains(words), "{said}");
+    }
+    // Bands are planes, with the names of columns: written as they come, or beside other files.
+    let values: Vec<f32> = planes[128..]
+        .as_chunks()
+        .0
+        .iter()
+        .copied()
+        .map(f32::from_le_bytes)
+        .collect();
+    let band = |name| Quantity {
+        name,
+        unit: "degrees",
+    };
+    let bands: Vec<Quantity<'_>> = all[0][3..].iter().map(|name| band(name)).collect();
+    let grid = place.raster("wall.asc").grid;
+    let wanted = antumbra_raster::write("a.tif".as_ref(), &grid, &values, &bands);
+    let wanted = wanted.expect("a raster");
+    for outputs in [&["-o", "a.tif"][..], &["-o", "a.tiff", "-o", "a.csv"]] {
+        place.run(&[&lattice[..], outputs].concat()).expect(0);
+        assert!(read(outputs[1]) == wanted, "{outputs:?}");
     }
     let one = [
         "horizon",

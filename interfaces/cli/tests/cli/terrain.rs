@@ -26,9 +26,9 @@ fn place() -> Place {
         name: "height",
         unit: "m",
     };
-    let bytes = write("dem.tif".as_ref(), &grid, &heights, quantity).expect("a raster");
+    let bytes = write("dem.tif".as_ref(), &grid, &heights, &[quantity]).expect("a raster");
     place.write("dem.tif", bytes);
-    let bytes = write("dem.asc".as_ref(), &grid, &heights, quantity).expect("a raster");
+    let bytes = write("dem.asc".as_ref(), &grid, &heights, &[quantity]).expect("a raster");
     place.write("dem.asc", bytes);
     place
 }
@@ -148,7 +148,7 @@ fn tiles(place: &Place) -> [&'static str; 4] {
         let lines = (row..row + height).map(|y| &heights[40 * y + column..40 * y + column + width]);
         let values: Vec<f32> = lines.flatten().copied().collect();
         let quantity = Quantity { name: "", unit: "" };
-        let bytes = write(name.as_ref(), &grid, &values, quantity).expect("a raster");
+        let bytes = write(name.as_ref(), &grid, &values, &[quantity]).expect("a raster");
         place.write(name, bytes);
     }
     names
@@ -579,7 +579,7 @@ impl Place {
             name: "height",
             unit,
         };
-        let bytes = write(name.as_ref(), grid, heights, quantity);
+        let bytes = write(name.as_ref(), grid, heights, &[quantity]);
         self.write(name, bytes.expect("a raster"));
     }
 }

@@ -31,7 +31,7 @@ impl Baked<'_> {
                 let quantity = Quantity { name, unit };
                 if let Some(terrain) = self.terrain {
                     let values = terrain.spread(&values);
-                    return raster::write_values(path, &terrain.grid(crs), &values, quantity);
+                    return raster::write_values(path, &terrain.grid(crs), &values, &[quantity]);
                 }
                 let place = (crs, args.places.units.metres());
                 let (ground, _) = self.mesh()?;

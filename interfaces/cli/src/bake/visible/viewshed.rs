@@ -201,7 +201,7 @@ fn write(
         match Format::of_sensors(path)? {
             Format::Raster => {
                 let grid = terrain.grid(args.raster.crs.as_ref());
-                raster::write_values(path, &grid, values, quantity)?;
+                raster::write_values(path, &grid, values, &[quantity])?;
             }
             format => others.push((path, format)),
         }
