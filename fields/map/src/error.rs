@@ -15,14 +15,14 @@ pub enum Error {
         wanted: usize,
     },
     /// The grid has no cells, or cells without a size.
-    #[error("a grid of {width} x {height} cells of size {cell} cannot be drawn")]
+    #[error("a grid of {width} x {height} cells of size {cell:?} cannot be drawn")]
     Grid {
         /// Number of columns.
         width: usize,
         /// Number of rows.
         height: usize,
-        /// Edge of a cell.
-        cell: f64,
+        /// Edges of a cell.
+        cell: [f64; 2],
     },
     /// A picture is too small for its text, or too large.
     #[error(

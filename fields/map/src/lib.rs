@@ -14,7 +14,7 @@
 //!     values: &hours,
 //!     width: 3,
 //!     height: 2,
-//!     cell: 10.0,
+//!     cell: [10.0; 2],
 //!     metres: Some(1.0),
 //!     north: 0.0,
 //!     title: "Courtyard",

@@ -17,7 +17,8 @@ pub(crate) const MOST: u64 = 100_000_000;
 /// Pixels of the picture inside for each pixel of the map, in both directions. Edges are smooth, and print is sharp.
 const FINE: u32 = 2;
 
-/// A map: values in square cells as they are seen from above, with the model's north at the top.
+/// A map: values in cells as they are seen from above, each with its true shape. The model's north is at the top, unless the
+/// cells are turned.
 #[derive(Clone, Debug)]
 pub struct Map<'a> {
     /// Values, `[height, width]`, row by row from north to south. NaN is no value.
@@ -26,8 +27,8 @@ pub struct Map<'a> {
     pub width: usize,
     /// Number of rows.
     pub height: usize,
-    /// Edge of a cell, in the unit of the model.
-    pub cell: f64,
+    /// Edges of a cell along rows and along columns, in the unit of the model.
+    pub cell: [f64; 2],
     /// Metres in a unit of the model; `None` if nobody knows: the scale bar then counts units.
     pub metres: Option<f64>,
     /// Degrees from the top of the map to true north, clockwise. NaN for no arrow, as where the map is an elevation.
@@ -53,7 +54,8 @@ pub struct Map<'a> {
 impl Map<'_> {
     /// A size in pixels that suits the shape of the grid: about 1600 pixels wide or high.
     pub fn usual_size(&self) -> [u32; 2] {
-        Layout::usual_size(self.aspect())
+        self.check_grid()
+            .map_or([1600, 1200], |()| Layout::usual_size(self.aspect()))
     }
 
     /// Columns and rows of the picture inside a map of this size. A [`Relief`] of as many pixels is sharp; its pixels have
@@ -113,31 +115,28 @@ impl Map<'_> {
 
     /// Lines of a world file, by which GIS programs place the pixels of a PNG of this size.
     ///
-    /// `corner` is the north-western corner of the grid, and `east` and `north` are vectors of length 1, all in the plane of
-    /// the coordinates of the model.
+    /// The `transform` has the place of the corner of column `c` and row `r` in the order of GDAL: `x = t[0] + c t[1] + r t[2]`
+    /// and `y = t[3] + c t[4] + r t[5]`.
     ///
     /// # Errors
     /// [`Error::Size`], [`Error::Grid`].
-    pub fn world_file(
-        &self,
-        size: [u32; 2],
-        corner: [f64; 2],
-        east: [f64; 2],
-        north: [f64; 2],
-    ) -> Result<String, Error> {
+    pub fn world_file(&self, size: [u32; 2], transform: [f64; 6]) -> Result<String, Error> {
         let layout = self.layout(size)?;
-        let pixel = self.extent()[0] / f64::from(layout.map_size[0]);
-        // Middle of the first pixel of the file, from the corner of the grid.
-        let [right, down] = layout.map_at.map(|x| (0.5 - f64::from(x)) * pixel);
-        let at = [0, 1].map(|i| corner[i] + right * east[i] - down * north[i]);
-        // A, D, B, E, C, F of the format: columns go east and rows south.
+        let [x, a, b, y, d, e] = transform;
+        // Cells in a pixel, and the middle of the first pixel of the file in columns and rows.
+        let of = |cells: usize, axis: usize| {
+            let part = cells as f64 / f64::from(layout.map_size[axis]);
+            (part, part * (0.5 - f64::from(layout.map_at[axis])))
+        };
+        let ((wide, c), (high, r)) = (of(self.width, 0), of(self.height, 1));
+        // A, D, B, E, C, F of the format.
         let lines = [
-            pixel * east[0],
-            pixel * east[1],
-            -pixel * north[0],
-            -pixel * north[1],
-            at[0],
-            at[1],
+            wide * a,
+            wide * d,
+            high * b,
+            high * e,
+            x + c * a + r * b,
+            y + c * d + r * e,
         ];
         // No minus zeros.
         Ok(lines.map(|x| format!("{:.10}\n", x + 0.0)).concat())
@@ -145,11 +144,15 @@ impl Map<'_> {
 
     /// Lengths of the grid to the east and north, in the unit of the model.
     fn extent(&self) -> [f64; 2] {
-        [self.width, self.height].map(|count| count as f64 * self.cell)
+        [
+            self.width as f64 * self.cell[0],
+            self.height as f64 * self.cell[1],
+        ]
     }
 
     fn aspect(&self) -> f32 {
-        self.width.max(1) as f32 / self.height.max(1) as f32
+        let [east, north] = self.extent();
+        (east / north) as f32
     }
 
     /// Whether a map can have this size in pixels.
@@ -168,15 +171,20 @@ impl Map<'_> {
         Ok(())
     }
 
-    fn layout(&self, size: [u32; 2]) -> Result<Layout, Error> {
-        let is_grid = self.width > 0 && self.height > 0 && self.cell > 0.0;
-        if !is_grid || !self.cell.is_finite() {
-            return Err(Error::Grid {
+    fn check_grid(&self) -> Result<(), Error> {
+        let is_length = |x: f64| x > 0.0 && x.is_finite();
+        match self.extent().into_iter().all(is_length) {
+            true => Ok(()),
+            false => Err(Error::Grid {
                 width: self.width,
                 height: self.height,
                 cell: self.cell,
-            });
+            }),
         }
+    }
+
+    fn layout(&self, size: [u32; 2]) -> Result<Layout, Error> {
+        self.check_grid()?;
         Self::check_size(size)?;
         Ok(Layout::new(size, self.aspect()))
     }
@@ -395,7 +403,7 @@ mod tests {
             values,
             width,
             height: values.len() / width,
-            cell: 1.0,
+            cell: [1.0; 2],
             metres: Some(1.0),
             north: 0.0,
             title: "Map",

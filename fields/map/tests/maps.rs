@@ -10,7 +10,7 @@ fn map(values: &[f32], width: usize) -> Map<'_> {
         values,
         width,
         height: values.len() / width,
-        cell: 2.0,
+        cell: [2.0; 2],
         metres: Some(1.0),
         north: 0.0,
         title: "Sun & shade <of> \"a\" court",
@@ -34,13 +34,27 @@ fn spot() -> Vec<f32> {
 #[test]
 fn the_world_file_says_where_cells_are() {
     let values = spot();
-    let map = map(&values, 40);
-    // Coordinates of a map whose y axis points 30 degrees east of north.
+    let mut map = map(&values, 40);
+    // Rows of cells that run as the axes do, or 30 degrees to the south of east, and cells that are twice as wide as high.
     let (sin, cos) = 30f64.to_radians().sin_cos();
-    for (east, north) in [([1.0, 0.0], [0.0, 1.0]), ([cos, -sin], [sin, cos])] {
+    let ways = [
+        ([1.0, 0.0], [0.0, 1.0], 2.0),
+        ([cos, -sin], [sin, cos], 2.0),
+        ([cos, -sin], [sin, cos], 1.0),
+    ];
+    for (east, north, high) in ways {
+        map.cell = [2.0, high];
         for size in [[1600, 1200], [900, 1300], [641, 480]] {
             let corner = [610_000.0, 5_330_000.0];
-            let text = map.world_file(size, corner, east, north).unwrap();
+            let transform = [
+                corner[0],
+                2.0 * east[0],
+                -high * north[0],
+                corner[1],
+                2.0 * east[1],
+                -high * north[1],
+            ];
+            let text = map.world_file(size, transform).unwrap();
             let lines: Vec<f64> = text.lines().map(|line| line.parse().unwrap()).collect();
             let [a, d, b, e, c, f] = lines[..] else {
                 panic!("{text}")
@@ -58,8 +72,12 @@ fn the_world_file_says_where_cells_are() {
             assert!(count > 100.0, "{size:?}: {count} light pixels");
             let [x, y] = sum.map(|x| x / count);
             let found = [a * x + b * y + c, d * x + e * y + f];
-            // The spot is 20 to 22 to the east of the corner and 10 to 12 to the south.
-            let wanted = [0, 1].map(|i| corner[i] + 21.0 * east[i] - 11.0 * north[i]);
+            // The spot is in the middle of column 10 and row 5.
+            let wanted = [0, 1].map(|i| corner[i] + 21.0 * east[i] - 5.5 * high * north[i]);
+            // The frame is at whole pixels in both directions.
+            for pixels in [80.0 / a.hypot(d), 20.0 * high / b.hypot(e)] {
+                assert!((pixels - pixels.round()).abs() < 1e-4, "{size:?}: {pixels}");
+            }
             let pixel = a.hypot(d);
             for axis in 0..2 {
                 let apart = (found[axis] - wanted[axis]).abs();
@@ -177,7 +195,7 @@ fn what_cannot_be_drawn_is_an_error() {
     ));
     for cell in [0.0, -1.0, f64::NAN, f64::INFINITY] {
         let bad = Map {
-            cell,
+            cell: [1.0, cell],
             ..good.clone()
         };
         assert!(

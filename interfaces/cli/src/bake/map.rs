@@ -124,7 +124,7 @@ impl<'a> Sheet<'a> {
             values,
             width: self.grid.width,
             height: self.grid.height,
-            cell: self.plan.cell,
+            cell: [self.plan.cell; 2],
             metres: self.plan.metres,
             north: self.plan.north.unwrap_or(f64::NAN),
             title: self.args.title.as_deref().unwrap_or(&words.title),
@@ -245,8 +245,10 @@ fn world_file(map: &Map<'_>, size: [u32; 2], plan: &Plan<'_>) -> Result<String, 
         .scene([a[0].min(b[0]), a[1].max(b[1]), 0.0]);
     let origin = plan.ground.local.origin;
     let world = [0, 1, 2].map(|axis| corner[axis] + origin[axis]);
-    let (east, north) = (flat(plan.orientation.east), flat(plan.orientation.north));
-    map.world_file(size, flat(world), east, north)
+    let [x, y] = flat(world);
+    let [a, d] = flat(plan.orientation.east).map(|part| plan.cell * part);
+    let [b, e] = flat(plan.orientation.north).map(|part| -plan.cell * part);
+    map.world_file(size, [x, a, b, y, d, e])
         .map_err(Failure::work)
 }
 

@@ -128,7 +128,7 @@ impl Map {
             values: &values,
             width,
             height,
-            cell,
+            cell: [cell; 2],
             metres,
             north,
             title,
