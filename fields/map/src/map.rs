@@ -46,7 +46,7 @@ pub struct Map<'a> {
     /// Small line at the bottom: files, program and version.
     pub source: &'a str,
     /// The model beneath the values.
-    pub relief: Option<Relief<'a>>,
+    pub relief: Option<&'a Relief>,
     /// Colours of paper and text.
     pub theme: Theme,
 }
@@ -96,7 +96,7 @@ impl Map<'_> {
         if !(low < high && low.is_finite() && high.is_finite()) {
             return Err(Error::Range(low, high));
         }
-        if let Some(relief) = &self.relief {
+        if let Some(relief) = self.relief {
             relief.check()?;
         }
         let mut parts = Parts {
@@ -198,7 +198,7 @@ impl Map<'_> {
             for column in 0..columns {
                 let value = means.at(column, row);
                 let colour = (!value.is_nan()).then(|| self.steps.colour(value));
-                let shade = self.relief.as_ref().map(|relief| {
+                let shade = self.relief.map(|relief| {
                     let x =
                         (column as f64 + 0.5) / columns as f64 * self.extent()[0] / relief.pixel;
                     let y = (row as f64 + 0.5) / rows as f64 * self.extent()[1] / relief.pixel;

@@ -5,8 +5,8 @@ use crate::Error;
 /// The model as it is seen from above, in square pixels, row by row from north to south.
 ///
 /// Pixels without a surface have the height NaN.
-#[derive(Clone, Copy, Debug)]
-pub struct Relief<'a> {
+#[derive(Clone, Debug)]
+pub struct Relief {
     /// Number of columns.
     pub width: usize,
     /// Number of rows.
@@ -14,9 +14,11 @@ pub struct Relief<'a> {
     /// Edge of a pixel, in the unit of the model.
     pub pixel: f64,
     /// Heights, `[height, width]`, in the unit of the model.
-    pub heights: &'a [f32],
+    pub heights: Vec<f32>,
     /// Normals of length 1, turned upwards, as east, north and up, `[height, width, 3]`.
-    pub normals: &'a [[f32; 3]],
+    pub normals: Vec<[f32; 3]>,
+    /// Whether edges are lines, as a map of buildings has them.
+    pub has_edges: bool,
 }
 
 /// How a pixel of a relief is painted.
@@ -57,7 +59,92 @@ const CREASE: f32 = 0.85;
 const BREAK: f32 = 0.35;
 const TURN: f32 = 0.7;
 
-impl Relief<'_> {
+impl Relief {
+    /// A surface of heights of square pixels in rows of this width, `[n, width]`. NaN is a hole.
+    ///
+    /// Normals come from central differences, and beside a hole or the border from the difference to the other side.
+    ///
+    /// # Example
+    ///
+    /// ```
+    /// // Climbs by 1 from one pixel to the next in the east.
+    /// let relief = antumbra_map::Relief::of_heights(vec![0.0, 1.0, 2.0], 3, 1.0);
+    /// assert_eq!(relief.normals[1], [-0.5_f32.sqrt(), 0.0, 0.5_f32.sqrt()]);
+    /// ```
+    pub fn of_heights(heights: Vec<f32>, width: usize, pixel: f64) -> Self {
+        let height = heights.len() / width.max(1);
+        Self {
+            normals: normals(&heights, [width, height], pixel, [1; 2]),
+            width,
+            height,
+            pixel,
+            heights,
+            has_edges: true,
+        }
+    }
+
+    /// Terrain of the heights of `[columns, rows]` cells, whose edges have these lengths, in pixels of another size and without
+    /// edges. Heights that are not finite are holes.
+    ///
+    /// A pixel that is larger than a cell has the mean of cells around its middle. Smaller ones lie between the middles of
+    /// cells, with normals from differences over the length of a cell, so that no cell is a facet.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if there are more or fewer heights than cells.
+    pub fn of_cells(
+        heights: &[f64],
+        [columns, rows]: [usize; 2],
+        cell: [f64; 2],
+        pixel: f64,
+    ) -> Result<Self, Error> {
+        if heights.len() != columns * rows {
+            return Err(Error::Length {
+                what: "heights",
+                found: heights.len(),
+                wanted: columns * rows,
+            });
+        }
+        // Single precision is fine as seen from one of the heights.
+        let base = heights.iter().find(|height| height.is_finite());
+        let base = base.copied().unwrap_or_default();
+        let across = boxes(columns, cell[0], pixel);
+        let along = boxes(rows, cell[1], pixel);
+        let mut means = Vec::with_capacity(across.len() * along.len());
+        for (top, weights) in &along {
+            for (left, parts) in &across {
+                let (mut sum, mut whole, mut most) = (0.0, 0.0, (0.0, f64::NAN));
+                for (row, weight) in weights.iter().enumerate() {
+                    let start = (top + row) * columns + left;
+                    for (height, part) in heights[start..].iter().zip(parts) {
+                        let weight = weight * part;
+                        if weight > most.0 {
+                            most = (weight, *height);
+                        }
+                        if height.is_finite() {
+                            (sum, whole) = (sum + weight * (height - base), whole + weight);
+                        }
+                    }
+                }
+                // A pixel between cells belongs to the nearest one. Among many, none decides.
+                let is_hole = pixel < cell[0].min(cell[1]) && !most.1.is_finite();
+                means.push(if is_hole {
+                    f32::NAN
+                } else {
+                    (sum / whole) as f32
+                });
+            }
+        }
+        let reach = cell.map(|edge| (edge / pixel).round().max(1.0) as usize);
+        let (width, height) = (across.len(), along.len());
+        Ok(Self {
+            width,
+            height,
+            pixel,
+            normals: normals(&means, [width, height], pixel, reach),
+            heights: means,
+            has_edges: false,
+        })
+    }
     /// Checks lengths.
     pub(crate) fn check(&self) -> Result<(), Error> {
         let wanted = self.width * self.height;
@@ -88,7 +175,10 @@ impl Relief<'_> {
         let normal = self.normals[index];
         let light: f32 = (0..3).map(|i| normal[i] * LIGHT[i]).sum();
         let relative = light.max(0.0) / LIGHT[2];
-        let edge = self.edge(column, row);
+        let edge = match self.has_edges {
+            true => self.edge(column, row),
+            false => 1.0,
+        };
         Shade::Surface {
             grey: (0.45 + 0.42 * relative).min(1.0),
             factor: (0.62 + 0.38 * relative).min(1.0),
@@ -130,6 +220,55 @@ impl Relief<'_> {
     }
 }
 
+/// Of each pixel along a side: the first cell of the box around its middle, and the parts of the cells in the box. Its length
+/// is a whole number of cells, so that even slopes keep their heights.
+fn boxes(count: usize, cell: f64, pixel: f64) -> Vec<(usize, Vec<f64>)> {
+    let pixels = (count as f64 * cell / pixel - 1e-6).ceil().max(1.0) as usize;
+    let half = (pixel / cell).round().max(1.0) / 2.0;
+    let parts = |index: usize| {
+        let middle = (index as f64 + 0.5) * pixel / cell;
+        let middle = middle.clamp(0.5, count as f64 - 0.5);
+        let [low, high] = [(middle - half).max(0.0), middle + half];
+        let cells = low as usize..(high.ceil() as usize).min(count);
+        let part = |cell: usize| high.min(cell as f64 + 1.0) - low.max(cell as f64);
+        (cells.start, cells.map(part).collect())
+    };
+    (0..pixels).map(parts).collect()
+}
+
+/// Normals of heights from differences over so many pixels to both sides.
+fn normals(
+    heights: &[f32],
+    [width, height]: [usize; 2],
+    pixel: f64,
+    reach: [usize; 2],
+) -> Vec<[f32; 3]> {
+    // Slope between two places; where one is absent, from the other one to the place itself.
+    let slope = |[before, here, after]: [f32; 3], reach: usize| {
+        let known = [before, after].map(|x| if x.is_nan() { here } else { x });
+        let steps = 2.0 - f32::from(before.is_nan()) - f32::from(after.is_nan());
+        (known[1] - known[0]) / (steps.max(1.0) * reach as f32 * pixel as f32)
+    };
+    let normal = |index: usize| {
+        let (column, row) = (index % width, index / width);
+        let at = |column: Option<usize>, row: Option<usize>| match (column, row) {
+            (Some(column), Some(row)) if column < width && row < height => {
+                heights[row * width + column]
+            }
+            _ => f32::NAN,
+        };
+        let here = heights[index];
+        let [west, north] = [column.checked_sub(reach[0]), row.checked_sub(reach[1])];
+        let [east, south] = [column + reach[0], row + reach[1]];
+        let across = [at(west, Some(row)), here, at(Some(east), Some(row))];
+        let along = [at(Some(column), Some(south)), here, at(Some(column), north)];
+        let [x, y] = [slope(across, reach[0]), slope(along, reach[1])];
+        let length = (x * x + y * y + 1.0).sqrt();
+        [-x / length, -y / length, 1.0 / length]
+    };
+    (0..heights.len()).map(normal).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -141,8 +280,9 @@ mod tests {
             width: heights.len(),
             height: 1,
             pixel: 1.0,
-            heights,
-            normals,
+            heights: heights.to_vec(),
+            normals: normals.to_vec(),
+            has_edges: true,
         };
         let shade = |column| match relief.shade(column, 0) {
             Shade::Surface { factor, edge, .. } => factor * edge,
@@ -197,8 +337,9 @@ mod tests {
             width: 2,
             height: 2,
             pixel: 1.0,
-            heights: &[0.0; 4],
-            normals: &[UP; 3],
+            heights: vec![0.0; 4],
+            normals: vec![UP; 3],
+            has_edges: true,
         };
         assert!(matches!(
             relief.check(),
@@ -208,5 +349,66 @@ mod tests {
                 wanted: 4
             })
         ));
+    }
+
+    #[test]
+    fn cells_of_a_plane_have_its_normals_in_pixels_of_any_size() {
+        let ([columns, rows], cell, [x, y]) = ([60, 40], [2.0, 5.0], [0.4, -0.7]);
+        // Rows run from north to south.
+        let height = |east: f64, south: f64| 2000.0 + x * east - y * south;
+        let of = |i: usize| {
+            let [east, south] = [i % columns, i / columns].map(|i| i as f64 + 0.5);
+            height(cell[0] * east, cell[1] * south)
+        };
+        let heights: Vec<f64> = (0..columns * rows).map(of).collect();
+        let length = (x * x + y * y + 1.0_f64).sqrt();
+        let wanted = [-x / length, -y / length, 1.0 / length];
+        for pixel in [0.3, 1.0, 1.9, 2.6, 5.0, 7.7, 13.0] {
+            let relief = Relief::of_cells(&heights, [columns, rows], cell, pixel).expect("a plane");
+            let middle = [relief.width / 2, relief.height / 2];
+            let index = |c: usize, r: usize| r * relief.width + c;
+            for step in 0..3 {
+                let (c, r) = (middle[0] + step, middle[1] + step);
+                let normal = relief.normals[index(c, r)];
+                for axis in 0..3 {
+                    let apart = f64::from(normal[axis]) - wanted[axis];
+                    assert!(apart.abs() < 1e-3, "{pixel}: {normal:?}, not {wanted:?}");
+                }
+                // As seen from the first height.
+                let at = [c, r].map(|i| (i as f64 + 0.5) * pixel);
+                let wanted = height(at[0], at[1]) - heights[0];
+                let found = f64::from(relief.heights[index(c, r)]);
+                assert!(
+                    (found - wanted).abs() < 1e-3,
+                    "{pixel}: {found}, not {wanted}"
+                );
+            }
+            let covered = [relief.width, relief.height].map(|n| n as f64 * pixel);
+            assert!(covered[0] >= 120.0 && covered[1] >= 200.0, "{covered:?}");
+            assert!(relief.heights.iter().all(|height| height.is_finite()));
+        }
+        assert!(Relief::of_cells(&heights, [columns, rows - 1], cell, 1.0).is_err());
+    }
+
+    #[test]
+    fn holes_are_as_large_as_their_cells_and_have_no_edges() {
+        let mut heights = vec![5.0; 36];
+        heights[2 * 6 + 3] = f64::NAN;
+        let relief = Relief::of_cells(&heights, [6, 6], [4.0; 2], 1.0).expect("cells");
+        for (index, height) in relief.heights.iter().enumerate() {
+            let (column, row) = (index % 24, index / 24);
+            let is_hole = column / 4 == 3 && row / 4 == 2;
+            assert_eq!(height.is_nan(), is_hole, "{column}, {row}");
+            let level = Shade::Surface {
+                grey: 0.87,
+                factor: 1.0,
+                edge: 1.0,
+            };
+            let wanted = if is_hole { Shade::Nothing } else { level };
+            assert_eq!(relief.shade(column, row), wanted, "{column}, {row}");
+        }
+        // A pixel of many cells has the mean of those that are there.
+        let relief = Relief::of_cells(&heights, [6, 6], [4.0; 2], 8.0).expect("cells");
+        assert_eq!(relief.heights, [0.0; 9]);
     }
 }

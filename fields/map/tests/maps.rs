@@ -99,13 +99,15 @@ fn level_ground_has_the_colours_of_the_legend() {
     let heights = vec![3.0; width * height];
     let normals = vec![[0.0, 0.0, 1.0]; width * height];
     let plain = map.draw(size).unwrap().pixels().unwrap();
-    map.relief = Some(Relief {
+    let relief = Relief {
         width,
         height,
         pixel: map.relief_pixel(size).unwrap(),
-        heights: &heights,
-        normals: &normals,
-    });
+        heights,
+        normals,
+        has_edges: true,
+    };
+    map.relief = Some(&relief);
     let relief = map.draw(size).unwrap().pixels().unwrap();
     let count = |colour| {
         plain

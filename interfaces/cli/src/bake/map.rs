@@ -80,7 +80,7 @@ pub struct Sheet<'a> {
     plan: &'a Plan<'a>,
     grid: &'a Grid,
     size: [u32; 2],
-    relief: Option<Seen>,
+    relief: Option<Relief>,
 }
 
 impl<'a> Sheet<'a> {
@@ -108,7 +108,7 @@ impl<'a> Sheet<'a> {
         let pixel = coarser * map.relief_pixel(size).map_err(Failure::work)?;
         // Sensors of pixels are where rays from above hit the model.
         let seen = Sensors::on_grid((plan.bvh, &|_| None), pixel, plan.orientation)?;
-        sheet.relief = Seen::new(&seen, plan.orientation, pixel);
+        sheet.relief = relief(&seen, plan.orientation, pixel);
         sheet.size = size;
         Ok(sheet)
     }
@@ -119,7 +119,6 @@ impl<'a> Sheet<'a> {
         (values, source): (&'b [f32], &'b str),
         steps: Steps,
     ) -> Map<'b> {
-        let relief = self.relief.as_ref();
         Map {
             values,
             width: self.grid.width,
@@ -133,13 +132,7 @@ impl<'a> Sheet<'a> {
             unit: words.unit,
             steps,
             source,
-            relief: relief.map(|seen| Relief {
-                width: seen.width,
-                height: seen.height,
-                pixel: seen.pixel,
-                heights: &seen.heights,
-                normals: &seen.normals,
-            }),
+            relief: self.relief.as_ref(),
             theme: self.args.theme(),
         }
     }
@@ -186,34 +179,24 @@ impl<'a> Sheet<'a> {
 }
 
 /// The model as it is seen, with places without a surface.
-struct Seen {
-    width: usize,
-    height: usize,
-    /// Edge of a pixel, in units of the mesh.
-    pixel: f64,
-    heights: Vec<f32>,
-    normals: Vec<[f32; 3]>,
-}
-
-impl Seen {
-    fn new(sensors: &Sensors, orientation: &Orientation, pixel: f64) -> Option<Self> {
-        let Layout::Grid(grid) = &sensors.layout else {
-            return None;
-        };
-        let local = |vector: [f32; 3]| orientation.local(vector.map(f64::from));
-        let heights: Vec<f32> = sensors.points.iter().map(|p| local(*p)[2] as f32).collect();
-        let mut normals = vec![[0.0, 0.0, 1.0]; grid.width * grid.height];
-        for (&cell, normal) in grid.cells.iter().zip(&sensors.normals) {
-            normals[cell as usize] = local(*normal).map(|x| x as f32);
-        }
-        Some(Self {
-            width: grid.width,
-            height: grid.height,
-            pixel,
-            heights: grid.picture(&heights),
-            normals,
-        })
+fn relief(sensors: &Sensors, orientation: &Orientation, pixel: f64) -> Option<Relief> {
+    let Layout::Grid(grid) = &sensors.layout else {
+        return None;
+    };
+    let local = |vector: [f32; 3]| orientation.local(vector.map(f64::from));
+    let heights: Vec<f32> = sensors.points.iter().map(|p| local(*p)[2] as f32).collect();
+    let mut normals = vec![[0.0, 0.0, 1.0]; grid.width * grid.height];
+    for (&cell, normal) in grid.cells.iter().zip(&sensors.normals) {
+        normals[cell as usize] = local(*normal).map(|x| x as f32);
     }
+    Some(Relief {
+        width: grid.width,
+        height: grid.height,
+        pixel,
+        heights: grid.picture(&heights),
+        normals,
+        has_edges: true,
+    })
 }
 
 /// Small line below a map.

@@ -120,8 +120,14 @@ impl Map {
         let surface = heights.map(|heights| grid(heights, "heights"));
         let surface = surface.transpose()?;
         let steps = steps(range, &values)?;
-        let relief = surface.as_ref().map(|(heights, rows, columns)| {
-            Surface::new(heights, (*rows, *columns), (height, width), cell)
+        let relief = surface.map(|(heights, rows, columns)| {
+            if rows * width != columns * height {
+                let wanted = format!("the proportions of ({height}, {width})");
+                return Err(wrong_shape("heights", &[rows, columns], &wanted));
+            }
+            memory::check(heights.len(), size_of::<[f32; 3]>(), CELLS)?;
+            let pixel = cell * width as f64 / columns.max(1) as f64;
+            Ok(Relief::of_heights(heights, columns, pixel))
         });
         let relief = relief.transpose()?;
         let sheet = Sheet {
@@ -137,7 +143,7 @@ impl Map {
             unit,
             steps: steps.clone(),
             source,
-            relief: relief.as_ref().map(Surface::relief),
+            relief: relief.as_ref(),
             theme: if dark { Theme::Dark } else { Theme::Light },
         };
         let size = size.map_or_else(|| sheet.usual_size(), |(width, height)| [width, height]);
@@ -320,74 +326,4 @@ fn steps(range: Option<(f64, f64)>, values: &[f32]) -> PyResult<Steps> {
 
 fn unwritten(error: antumbra_image::Error) -> PyErr {
     PyOSError::new_err(error.to_string())
-}
-
-/// Heights with the normals between them.
-struct Surface<'a> {
-    heights: &'a [f32],
-    normals: Vec<[f32; 3]>,
-    rows: usize,
-    columns: usize,
-    pixel: f64,
-}
-
-impl<'a> Surface<'a> {
-    /// A surface under values of a shape, whose cells are so wide in the unit of the model. Normals come from central differences.
-    fn new(
-        heights: &'a [f32],
-        (rows, columns): (usize, usize),
-        (height, width): (usize, usize),
-        cell: f64,
-    ) -> PyResult<Self> {
-        let pixel = cell * width as f64 / columns.max(1) as f64;
-        let at = |row: usize, column: usize| heights[row * columns + column];
-        // Slope between two neighbours; where one is absent, from the other one to the pixel itself.
-        let slope = |[before, here, after]: [f32; 3]| {
-            let known = [before, after].map(|x| if x.is_nan() { here } else { x });
-            let steps = 2.0 - f32::from(before.is_nan()) - f32::from(after.is_nan());
-            if steps == 0.0 {
-                0.0
-            } else {
-                (known[1] - known[0]) / (steps * pixel as f32)
-            }
-        };
-        let normal = |index: usize| {
-            let (row, column) = (index / columns, index % columns);
-            let beside = |is_there: bool, row: usize, column: usize| match is_there {
-                true => at(row, column),
-                false => f32::NAN,
-            };
-            let here = at(row, column);
-            let west = beside(column > 0, row, column.wrapping_sub(1));
-            let east = beside(column + 1 < columns, row, column + 1);
-            let north = beside(row > 0, row.wrapping_sub(1), column);
-            let south = beside(row + 1 < rows, row + 1, column);
-            let [x, y] = [slope([west, here, east]), slope([south, here, north])];
-            let length = (x * x + y * y + 1.0).sqrt();
-            [-x / length, -y / length, 1.0 / length]
-        };
-        let count = rows * columns;
-        let normals = memory::collected((0..count).map(normal), count, CELLS)?;
-        if rows * width != columns * height {
-            let wanted = format!("the proportions of ({height}, {width})");
-            return Err(wrong_shape("heights", &[rows, columns], &wanted));
-        }
-        Ok(Self {
-            heights,
-            normals,
-            rows,
-            columns,
-            pixel,
-        })
-    }
-
-    fn relief(&self) -> Relief<'_> {
-        Relief {
-            width: self.columns,
-            height: self.rows,
-            pixel: self.pixel,
-            heights: self.heights,
-            normals: &self.normals,
-        }
-    }
 }
