@@ -4,10 +4,14 @@ use antumbra_image::{Rgb8Image, palette};
 
 use crate::drawing::{Anchor, Item, Weight, rectangle};
 use crate::sheet::Sheet;
+use crate::steps::Class;
 use crate::{Error, Steps, font};
 
 /// Colours in the bar.
 const COLOURS: usize = 256;
+
+/// Height in em of a line below or beside the bar.
+const LINE: f32 = 1.6;
 
 /// A bar of colours with numbers.
 pub(crate) struct Legend<'a> {
@@ -16,6 +20,8 @@ pub(crate) struct Legend<'a> {
     pub steps: &'a Steps,
     /// Whether values lie below and above the bar.
     pub beyond: [bool; 2],
+    /// Name of the symbols on the map, if there are any.
+    pub symbol: Option<&'a str>,
 }
 
 /// Where large values are.
@@ -48,10 +54,20 @@ impl Legend<'_> {
         }
         let below_name = y + em * (1.25 * lines.len() as f32 + 0.35);
         let (thick, tip) = (1.3 * em, 0.9 * em);
-        // A class has as much room as two lines of text.
-        let length = match self.steps.classes.len() {
-            0 => length,
-            classes => length.min(2.0 * tip + 2.6 * em * classes as f32),
+        // A class has as much room as two lines of text, or as the longest one beside others.
+        let classes = self.steps.classes.iter();
+        let widths = classes.map(|class| font::width(&class.name, 0.95 * em, Weight::Regular));
+        let part = match direction {
+            Direction::Upright => 2.6 * em,
+            Direction::Across => widths.fold(2.6 * em, |most, width| most.max(width + 0.8 * em)),
+        };
+        let lines = usize::from(self.steps.zero.is_some()) + usize::from(self.symbol.is_some());
+        let length = match (self.steps.classes.len(), direction) {
+            (0, Direction::Across) => length,
+            (0, Direction::Upright) => {
+                (length - LINE * em * lines as f32).max(2.0 * tip + 2.0 * em)
+            }
+            (classes, _) => length.min(2.0 * tip + part * classes as f32),
         };
         // Room for both tips, whether there are any or not.
         let (at, size) = match direction {
@@ -66,7 +82,37 @@ impl Legend<'_> {
         self.draw_colours(sheet, &bar)?;
         self.draw_tips(sheet, &bar, tip);
         self.draw_marks(sheet, &bar);
+        let lines = match direction {
+            Direction::Upright => [x, below_name + length + 0.4 * em],
+            Direction::Across => [x + length + 1.6 * em, below_name - 0.2 * em],
+        };
+        self.draw_lines(sheet, lines);
         Ok(())
+    }
+
+    /// Draws what is not on the bar: the class of the value 0, and the symbol.
+    fn draw_lines(&self, sheet: &mut Sheet, [x, mut y]: [f32; 2]) {
+        let em = sheet.em;
+        if let Some(Class {
+            name,
+            colour,
+            share,
+        }) = &self.steps.zero
+        {
+            let swatch = rectangle([x, y + 0.3 * em], [1.3 * em, 0.9 * em]);
+            sheet.fill(swatch.clone(), *colour);
+            sheet.outline(swatch);
+            let share = share.map_or_else(String::new, |share| format!(", {}", percent(share)));
+            let at = [x + 1.9 * em, y + 1.1 * em];
+            let label = format!("{name}{share}");
+            sheet.text(&label, at, 0.95, Weight::Regular, Anchor::Start);
+            y += LINE * em;
+        }
+        if let Some(name) = self.symbol {
+            sheet.symbol([x + 0.65 * em, y + 0.75 * em]);
+            let at = [x + 1.9 * em, y + 1.1 * em];
+            sheet.text(name, at, 0.95, Weight::Regular, Anchor::Start);
+        }
     }
 
     /// Draws the colours of the bar: all of them, or one for each class.
@@ -77,7 +123,7 @@ impl Legend<'_> {
             let image = bar.direction.colours()?;
             sheet.items.push(Item::Picture { image, at, size });
         }
-        for (class, (_, colour)) in classes.iter().enumerate() {
+        for (class, Class { colour, .. }) in classes.iter().enumerate() {
             let (from, part) = (
                 class as f32 / classes.len() as f32,
                 1.0 / classes.len() as f32,
@@ -125,14 +171,22 @@ impl Legend<'_> {
         let classes = &self.steps.classes;
         for (index, &mark) in self.steps.marks.iter().enumerate() {
             let (place, label) = match classes.get(index) {
-                Some((name, _)) => ((index as f32 + 0.5) / classes.len() as f32, name.clone()),
+                Some(class) => {
+                    let place = (index as f32 + 0.5) / classes.len() as f32;
+                    (place, class.name.clone())
+                }
                 None => (self.steps.place(mark) as f32, self.steps.label(mark)),
             };
-            let (mark, at, anchor) = match bar.direction {
+            // A share is below its name, if there is room.
+            let room = size[0].max(size[1]) / classes.len().max(1) as f32;
+            let share = classes.get(index).and_then(|class| class.share);
+            let share = share.filter(|_| room >= 2.2 * em).map(percent);
+            let (mark, [x, y], anchor) = match bar.direction {
                 Direction::Upright => {
                     let y = y1 - place * size[1];
                     let mark = rectangle([x1, y - line / 2.0], [tick, line]);
-                    (mark, [x1 + tick + 0.3 * em, y + 0.36 * em], Anchor::Start)
+                    let up = if share.is_some() { -0.12 } else { 0.36 };
+                    (mark, [x1 + tick + 0.3 * em, y + up * em], Anchor::Start)
                 }
                 Direction::Across => {
                     let x = x0 + place * size[0];
@@ -141,7 +195,10 @@ impl Legend<'_> {
                 }
             };
             sheet.fill(mark, ink);
-            sheet.text(&label, at, 0.95, Weight::Regular, anchor);
+            sheet.text(&label, [x, y], 0.95, Weight::Regular, anchor);
+            if let Some(share) = share {
+                sheet.text(&share, [x, y + em], 0.78, Weight::Regular, anchor);
+            }
         }
     }
 }
@@ -169,5 +226,13 @@ impl Direction {
             Self::Upright => Rgb8Image::new(1, COLOURS, (0..COLOURS).rev().map(colour).collect())?,
             Self::Across => Rgb8Image::new(COLOURS, 1, (0..COLOURS).map(colour).collect())?,
         })
+    }
+}
+
+/// A share as it is written. Few are not none.
+fn percent(share: f64) -> String {
+    match share > 0.0 && share < 0.0005 {
+        true => "< 0.1 %".to_owned(),
+        false => format!("{:.1} %", 100.0 * share),
     }
 }

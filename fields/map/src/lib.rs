@@ -24,6 +24,7 @@
 //!     steps: Steps::around(&hours, false),
 //!     source: "courtyard.obj",
 //!     relief: None,
+//!     symbols: None,
 //!     theme: Theme::Light,
 //! };
 //! let drawing = map.draw(map.usual_size())?;
@@ -35,10 +36,10 @@
 //!
 //! # Files
 //!
-//! - `map.rs`: [`Map`]: what is drawn; `layout.rs`: where
+//! - `map.rs`: [`Map`]: what is drawn, with its [`Symbols`]; `layout.rs`: where
 //! - `panels.rs`: [`panels`], pictures beside each other
 //! - `sheet.rs`, `legend.rs`: what both are made of
-//! - `steps.rs`: [`Steps`], the rounded numbers of legends
+//! - `steps.rs`: [`Steps`], the rounded numbers of legends, or their [`Class`]es
 //! - `relief.rs`: [`Relief`], the model beneath the values
 //! - `theme.rs`: [`Theme`], colours of paper and text
 //! - `drawing.rs`: [`Drawing`], a list of shapes and text
@@ -68,8 +69,8 @@ pub use animation::Animation;
 pub use drawing::Drawing;
 pub use error::Error;
 pub use font::check as check_text;
-pub use map::Map;
+pub use map::{Map, Symbols};
 pub use panels::{Panel, PanelLegend, panels};
 pub use relief::Relief;
-pub use steps::Steps;
+pub use steps::{Class, Steps};
 pub use theme::Theme;

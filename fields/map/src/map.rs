@@ -17,6 +17,16 @@ pub(crate) const MOST: u64 = 100_000_000;
 /// Pixels of the picture inside for each pixel of the map, in both directions. Edges are smooth, and print is sharp.
 const FINE: u32 = 2;
 
+/// Places of a kind on a map, such as observers.
+#[derive(Clone, Copy, Debug)]
+pub struct Symbols<'a> {
+    /// Name of one of them, in the legend.
+    pub name: &'a str,
+    /// Columns and rows from the north-western corner, `[n, 2]`: `[0.5, 0.5]` is the middle of the first cell. A place that is
+    /// not on the map has no symbol.
+    pub places: &'a [[f64; 2]],
+}
+
 /// A map: values in cells as they are seen from above, each with its true shape. The model's north is at the top, unless the
 /// cells are turned.
 #[derive(Clone, Debug)]
@@ -47,6 +57,8 @@ pub struct Map<'a> {
     pub source: &'a str,
     /// The model beneath the values.
     pub relief: Option<&'a Relief>,
+    /// Places on the map, with a symbol each.
+    pub symbols: Option<Symbols<'a>>,
     /// Colours of paper and text.
     pub theme: Theme,
 }
@@ -106,6 +118,7 @@ impl Map<'_> {
         };
         parts.head();
         parts.map()?;
+        parts.symbols();
         parts.legend()?;
         parts.scale_bar();
         parts.north_arrow();
@@ -196,8 +209,7 @@ impl Map<'_> {
         let mut pixels = Vec::with_capacity(columns * rows);
         for row in 0..rows {
             for column in 0..columns {
-                let value = means.at(column, row);
-                let colour = (!value.is_nan()).then(|| self.steps.colour(value));
+                let colour = means.colour(column, row);
                 let shade = self.relief.map(|relief| {
                     let x =
                         (column as f64 + 0.5) / columns as f64 * self.extent()[0] / relief.pixel;
@@ -233,8 +245,32 @@ impl<'a> Means<'a> {
         }
     }
 
+    /// Colour of a pixel, if a cell has a value: the one of the mean. Where colours are classes, between which there are no
+    /// values, it is the mean of the colours.
+    fn colour(&self, column: usize, row: usize) -> Option<[u8; 3]> {
+        let steps = &self.map.steps;
+        if !steps.has_classes() {
+            let value = self.at(column, row);
+            return (!value.is_nan()).then(|| steps.colour(value));
+        }
+        let (mut sum, mut count) = ([0.0; 3], 0.0);
+        for value in self.known(column, row) {
+            let colour = steps.colour(value);
+            sum = [0, 1, 2].map(|i| sum[i] + f64::from(colour[i]));
+            count += 1.0;
+        }
+        (count > 0.0).then(|| sum.map(|x| (x / count).round() as u8))
+    }
+
     /// Value of a pixel, or NaN.
     fn at(&self, column: usize, row: usize) -> f64 {
+        let add = |(sum, count), value: f64| (sum + value, count + 1.0);
+        let (sum, count) = self.known(column, row).fold((0.0, 0.0), add);
+        sum / count
+    }
+
+    /// Values of the cells of a pixel, row by row, but for absent ones.
+    fn known(&self, column: usize, row: usize) -> impl Iterator<Item = f64> + '_ {
         let range = |pixel: usize, cells: f64, count: usize| {
             let [start, end] = [0.0, 1.0].map(|i| (pixel as f64 + i) * cells);
             let [first, last] = [(start - 0.5).ceil() as usize, (end - 0.5).ceil() as usize];
@@ -250,17 +286,13 @@ impl<'a> Means<'a> {
             range(column, self.cells[0], self.map.width),
             range(row, self.cells[1], self.map.height),
         );
-        let (mut sum, mut count) = (0.0, 0.0);
-        for row in rows {
-            for column in columns.clone() {
-                let value = self.map.values[row * self.map.width + column];
-                if !value.is_nan() {
-                    sum += f64::from(value);
-                    count += 1.0;
-                }
-            }
-        }
-        sum / count
+        let values = rows.flat_map(move |row| {
+            let start = row * self.map.width;
+            &self.map.values[start + columns.start..start + columns.end]
+        });
+        values
+            .filter(|value| !value.is_nan())
+            .map(|&value| f64::from(value))
     }
 }
 
@@ -306,12 +338,27 @@ impl Parts<'_> {
         Ok(())
     }
 
+    fn symbols(&mut self) {
+        let places = self.map.symbols.map_or(&[][..], |symbols| symbols.places);
+        for &[column, row] in places {
+            let at = [column / self.map.width as f64, row / self.map.height as f64];
+            if at.iter().all(|part| (0.0..=1.0).contains(part)) {
+                let Layout {
+                    map_at, map_size, ..
+                } = self.layout;
+                let at = [0, 1].map(|axis| map_at[axis] + at[axis] as f32 * map_size[axis]);
+                self.sheet.symbol(at);
+            }
+        }
+    }
+
     fn legend(&mut self) -> Result<(), Error> {
         let legend = Legend {
             quantity: self.map.quantity,
             unit: self.map.unit,
             steps: &self.map.steps,
             beyond: self.map.steps.beyond(self.map.values),
+            symbol: self.map.symbols.map(|symbols| symbols.name),
         };
         let layout = self.layout;
         let direction = match layout.is_upright {
@@ -413,6 +460,7 @@ mod tests {
             steps: Steps::between(0.0, 1.0, false),
             source: "",
             relief: None,
+            symbols: None,
             theme: Theme::Light,
         }
     }
@@ -436,5 +484,17 @@ mod tests {
         let map = self::map(&holes, 4);
         assert_eq!(Means::new(&map, [2, 2]).at(0, 0), (1.0 + 4.0 + 5.0) / 3.0);
         assert!(Means::new(&map, [4, 4]).at(0, 0).is_nan());
+    }
+
+    #[test]
+    fn pixels_of_many_classes_have_the_mean_of_colours() {
+        // 0, 1 and 2, of which no pixel is in the class between the others.
+        let values = [0.0, 2.0, 0.0, 2.0, f32::NAN, 2.0, f32::NAN, f32::NAN];
+        let mut map = map(&values, 4);
+        map.steps = Steps::classes(&[("a", [0; 3]), ("b", [250, 0, 0]), ("c", [100; 3])]);
+        let means = Means::new(&map, [2, 1]);
+        assert_eq!(means.colour(0, 0), Some([67; 3]));
+        assert_eq!(means.colour(1, 0), Some([50; 3]));
+        assert_eq!(Means::new(&map, [4, 2]).colour(2, 1), None);
     }
 }

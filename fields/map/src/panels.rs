@@ -119,6 +119,7 @@ pub fn panels(panels: &[Panel<'_>], theme: Theme) -> Result<Drawing, Error> {
                 unit: legend.unit,
                 steps: legend.steps,
                 beyond: legend.steps.beyond(legend.values),
+                symbol: None,
             };
             let at = [left, top + size[1] + 0.7 * em];
             let length = size[0].min(28.0 * em);

@@ -3,6 +3,13 @@
 use crate::drawing::{Anchor, Colour, Drawing, Item, Text, Weight, rectangle};
 use crate::{Theme, font};
 
+/// Radii in em and colours of the discs of a symbol. Viridis has no red.
+const SYMBOL: [(f32, Colour); 3] = [
+    (0.48, [28, 30, 34]),
+    (0.43, [255, 255, 255]),
+    (0.3, [206, 17, 38]),
+];
+
 /// A drawing that is being made.
 pub(crate) struct Sheet {
     /// Height of an em of ordinary text, in pixels.
@@ -59,5 +66,16 @@ impl Sheet {
             anchor,
             colour: if is_soft { theme.soft() } else { theme.text() },
         }));
+    }
+
+    /// Adds a symbol of a place: a disc with a light and a dark rim, one of which shows on any colour.
+    pub fn symbol(&mut self, [x, y]: [f32; 2]) {
+        for (radius, fill) in SYMBOL {
+            let corner = |i: u8| {
+                let (sin, cos) = (f32::from(i) / 32.0 * std::f32::consts::TAU).sin_cos();
+                [x + radius * self.em * cos, y + radius * self.em * sin]
+            };
+            self.fill((0..32).map(corner).collect(), fill);
+        }
     }
 }

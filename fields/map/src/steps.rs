@@ -2,6 +2,17 @@
 
 use antumbra_image::palette;
 
+/// A class of values in a legend.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Class {
+    /// Name beside its colour.
+    pub name: String,
+    /// Colour of sRGB.
+    pub colour: [u8; 3],
+    /// Part of the values that are in the class, from 0 to 1, below its name; `None` writes none.
+    pub share: Option<f64>,
+}
+
 /// Numbers of a legend: its ends and the steps between, all of them round.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Steps {
@@ -13,15 +24,20 @@ pub struct Steps {
     pub marks: Vec<f64>,
     /// Decimals of labels.
     pub decimals: usize,
-    /// Classes instead of numbers: names of the values 0, 1 and so on, with their colours. Empty for numbers.
-    pub classes: Vec<(String, [u8; 3])>,
+    /// Classes instead of numbers: of the values 0, 1 and so on. Empty for numbers.
+    pub classes: Vec<Class>,
+    /// Class of the value 0 beside numbers, where 0 is no small number but none at all.
+    pub zero: Option<Class>,
 }
 
 /// Largest number of steps.
 const MOST: f64 = 7.0;
 
 /// Counts from here on are numbers, not classes.
-const MOST_CLASSES: f32 = 10.0;
+const MOST_CLASSES: f32 = 9.0;
+
+/// Colour of a class of none: no colour of the others, and lighter than all but the largest values.
+const NONE: [u8; 3] = [206, 207, 211];
 
 /// Share of the values that may lie beyond each end of a legend.
 const BEYOND: f64 = 0.002;
@@ -30,23 +46,30 @@ impl Steps {
     /// Steps for these values: round numbers around almost all of them. A few outliers in a thousand may lie beyond, which
     /// the map marks. Values from 0 up begin at 0, unless they are far from it. NaN and infinities do not count.
     ///
-    /// With `whole` values are counts: each of up to ten is a class of its own, and of more none lies beyond, because the few
-    /// places with the highest count are those that people look for.
+    /// With `whole` values are counts: up to 8 each of them is a class of its own, with its share of the values, because nobody
+    /// distinguishes more colours. Of more none lies beyond, because the few places with the highest count are those that people
+    /// look for.
     pub fn around(values: &[f32], whole: bool) -> Self {
         let mut known: Vec<f32> = values.iter().copied().filter(|x| x.is_finite()).collect();
         if known.is_empty() {
             return Self::between(0.0, 1.0, whole);
         }
-        known.sort_unstable_by(f32::total_cmp);
-        let most = known[known.len() - 1];
-        if whole && known[0] >= 0.0 && most < MOST_CLASSES {
+        let most = known.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let least = known.iter().copied().fold(f32::INFINITY, f32::min);
+        if whole && least >= 0.0 && most < MOST_CLASSES {
             let last = most.max(1.0);
-            let class = |i: usize| (i.to_string(), palette::colour(i as f32 / last));
+            let class = |i: usize| Class {
+                name: i.to_string(),
+                colour: palette::colour(i as f32 / last),
+                share: share(values, i as f32),
+            };
             return Self::of_classes((0..=last as usize).map(class).collect());
         }
         let share = if whole { 0.0 } else { BEYOND };
+        let last = known.len() - 1;
         let beyond = (share * known.len() as f64) as usize;
-        let [mut low, mut high] = [known[beyond], known[known.len() - 1 - beyond]].map(f64::from);
+        let mut nth = |index| *known.select_nth_unstable_by(index, f32::total_cmp).1;
+        let [mut low, mut high] = [beyond, last - beyond].map(|i| f64::from(nth(i)));
         if low >= 0.0 && low < 0.6 * high {
             low = 0.0;
         }
@@ -78,36 +101,60 @@ impl Steps {
             marks: marks.map(|x| x + 0.0).collect(),
             decimals,
             classes: Vec::new(),
+            zero: None,
         }
+    }
+
+    /// The same steps with a class of its own for the value 0, such as places that nobody sees, with its share of these values.
+    pub fn with_zero(mut self, name: &str, values: &[f32]) -> Self {
+        let zero = Class {
+            name: name.to_owned(),
+            colour: NONE,
+            share: share(values, 0.0),
+        };
+        match self.classes.first_mut() {
+            Some(class) => *class = zero,
+            None => {
+                self.marks.retain(|&mark| mark != 0.0);
+                self.zero = Some(zero);
+            }
+        }
+        self
     }
 
     /// Classes with names and colours: the values 0, 1 and so on.
     pub fn classes(classes: &[(&str, [u8; 3])]) -> Self {
-        let named = classes
-            .iter()
-            .map(|&(name, colour)| (name.to_owned(), colour));
+        let named = classes.iter().map(|&(name, colour)| Class {
+            name: name.to_owned(),
+            colour,
+            share: None,
+        });
         Self::of_classes(named.collect())
     }
 
-    fn of_classes(classes: Vec<(String, [u8; 3])>) -> Self {
+    fn of_classes(classes: Vec<Class>) -> Self {
         Self {
             low: 0.0,
             high: classes.len().saturating_sub(1).max(1) as f64,
             marks: (0..classes.len()).map(|i| i as f64).collect(),
             decimals: 0,
             classes,
+            zero: None,
         }
     }
 
     /// Colour of a value: of viridis, or between the colours of two classes.
     pub fn colour(&self, value: f64) -> [u8; 3] {
+        if let (Some(zero), true) = (&self.zero, value == 0.0) {
+            return zero.colour;
+        }
         if self.classes.is_empty() {
             return palette::colour(self.place(value) as f32);
         }
         let last = self.classes.len() - 1;
         let value = value.clamp(0.0, last as f64);
         let below = value.floor() as usize;
-        let [a, b] = [below, (below + 1).min(last)].map(|class| self.classes[class].1);
+        let [a, b] = [below, (below + 1).min(last)].map(|class| self.classes[class].colour);
         let part = value - below as f64;
         let mix = |(&a, b): (&u8, u8)| f64::from(a) + part * (f64::from(b) - f64::from(a));
         let mut colour = a;
@@ -117,13 +164,18 @@ impl Steps {
         colour
     }
 
-    /// Whether some of these values lie below and above the legend. NaN does not.
+    /// Whether colours are of classes, between which there are no values.
+    pub(crate) fn has_classes(&self) -> bool {
+        self.zero.is_some() || !self.classes.is_empty()
+    }
+
+    /// Whether some of these values lie below and above the legend. NaN does not, nor does a 0 with a class of its own.
     pub fn beyond(&self, values: &[f32]) -> [bool; 2] {
         // Values of single precision may round beyond an end that they equal.
         let slack = 1e-6 * (self.high - self.low);
         let any = |beyond: &dyn Fn(f64) -> bool| values.iter().any(|&x| beyond(f64::from(x)));
         [
-            any(&|x| x < self.low - slack),
+            any(&|x| x < self.low - slack && (x != 0.0 || self.zero.is_none())),
             any(&|x| x > self.high + slack),
         ]
     }
@@ -142,6 +194,13 @@ impl Steps {
             None => text,
         }
     }
+}
+
+/// Part of the values that are finite which equals a value.
+fn share(values: &[f32], value: f32) -> Option<f64> {
+    let count =
+        |is_counted: &dyn Fn(f32) -> bool| values.iter().filter(|&&x| is_counted(x)).count();
+    Some(count(&|x| x == value) as f64 / count(&f32::is_finite).max(1) as f64)
 }
 
 /// The least round number that is not below `least`: 1, 2, 2.5 or 5 times a power of ten; at least 1 if it has to be `whole`.
@@ -192,9 +251,36 @@ mod tests {
         let steps = Steps::around(&seen, true);
         assert_eq!(steps.marks, [0.0, 1.0, 2.0]);
         assert_eq!(steps.beyond(&seen), [false; 2]);
+        let shares: Vec<_> = steps.classes.iter().map(|class| class.share).collect();
+        assert_eq!(shares, [Some(0.998), Some(0.001), Some(0.001)]);
         seen[7] = 40.0;
         let steps = Steps::around(&seen, true);
         assert!(steps.classes.is_empty() && steps.high >= 40.0);
+    }
+
+    #[test]
+    fn none_is_a_class_of_its_own() {
+        for most in [2.0, 40.0] {
+            let seen = [0.0, 1.0, 0.0, most, f32::NAN];
+            let plain = Steps::around(&seen, true);
+            let steps = plain.clone().with_zero("not seen", &seen);
+            assert_eq!(plain.has_classes(), most < 10.0);
+            assert!(steps.has_classes());
+            let zero = steps
+                .zero
+                .as_ref()
+                .or(steps.classes.first())
+                .expect("a class");
+            assert_eq!((zero.name.as_str(), zero.share), ("not seen", Some(0.5)));
+            assert_eq!(steps.colour(0.0), NONE);
+            for count in [1.0, 2.0] {
+                assert_eq!(steps.colour(count), plain.colour(count));
+            }
+            assert!(steps.zero.is_none() || !steps.marks.contains(&0.0));
+            // Of ends that were chosen, 0 is not below.
+            let chosen = Steps::between(1.0, 40.0, true).with_zero("not seen", &seen);
+            assert_eq!(chosen.beyond(&seen), [false; 2]);
+        }
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! Maps as files: what is where, in all three formats.
 
-use antumbra_map::{Error, Map, Relief, Steps, Theme};
+use antumbra_map::{Error, Map, Relief, Steps, Symbols, Theme};
 
 const DARK: [u8; 3] = [68, 1, 84];
 const LIGHT: [u8; 3] = [253, 231, 37];
@@ -20,6 +20,7 @@ fn map(values: &[f32], width: usize) -> Map<'_> {
         steps: Steps::between(0.0, 1.0, false),
         source: "court.obj",
         relief: None,
+        symbols: None,
         theme: Theme::Light,
     }
 }
@@ -226,6 +227,75 @@ fn every_shape_is_drawn() {
         for size in [map.usual_size(), [320, 320], [1200, 400]] {
             let picture = map.draw(size).unwrap().pixels().unwrap();
             assert_eq!([picture.width() as u32, picture.height() as u32], size);
+        }
+    }
+}
+
+#[test]
+fn symbols_are_at_their_places_in_all_formats() {
+    let values = vec![0.0; 800];
+    let mut map = map(&values, 40);
+    map.cell = [2.0, 3.0];
+    // One of them is beyond the map.
+    let places = [[10.5, 5.5], [40.1, 3.0]];
+    map.symbols = Some(Symbols {
+        name: "observer",
+        places: &places,
+    });
+    let red = [206, 17, 38];
+    for size in [[1600, 1200], [700, 900]] {
+        let picture = map.draw(size).unwrap().pixels().unwrap();
+        let transform = [0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+        let text = map.world_file(size, transform).unwrap();
+        let lines: Vec<f64> = text.lines().map(|line| line.parse().unwrap()).collect();
+        // Pixels whose place in columns and rows is on the map, and not on the legend.
+        let mut found = Vec::new();
+        for (index, pixel) in picture.pixels().iter().enumerate() {
+            let at = [index % picture.width(), index / picture.width()].map(|i| i as f64);
+            let at = [lines[0] * at[0] + lines[4], lines[3] * at[1] + lines[5]];
+            if *pixel == red && at[0] < 40.0 && at[1] < 20.0 {
+                found.push(at);
+            }
+        }
+        assert!(found.len() > 15, "{size:?}: {}", found.len());
+        for axis in 0..2 {
+            let mean = found.iter().map(|at| at[axis]).sum::<f64>() / found.len() as f64;
+            let pixel = lines[3 * axis];
+            assert!(
+                (mean - places[0][axis]).abs() < 0.2 * pixel,
+                "{size:?}: {mean}"
+            );
+        }
+    }
+    let drawing = map.draw([640, 480]).unwrap();
+    let svg = drawing.svg().unwrap();
+    // One on the map and one in the legend.
+    assert_eq!(svg.matches("fill=\"#ce1126\"").count(), 2);
+    assert!(svg.contains(">observer</text>"));
+    map.symbols = None;
+    let plain = map.draw([640, 480]).unwrap();
+    assert!(!plain.svg().unwrap().contains("#ce1126"));
+    assert!(drawing.pdf().unwrap().len() > plain.pdf().unwrap().len());
+}
+
+#[test]
+fn classes_have_a_legend_with_shares() {
+    for (most, names) in [
+        (
+            3.0,
+            &["not seen", "99.8 %", ">1<", "0.1 %", ">2<", "0.0 %", ">3<"][..],
+        ),
+        (30.0, &["not seen, 99.8 %", ">10<", ">30<"]),
+    ] {
+        let mut values = vec![0.0; 800];
+        (values[3], values[4]) = (1.0, most);
+        let mut map = map(&values, 40);
+        map.steps = Steps::around(&values, true).with_zero("not seen", &values);
+        for size in [[1600, 1200], [700, 900]] {
+            let svg = map.draw(size).unwrap().svg().unwrap();
+            for name in names {
+                assert!(svg.contains(name), "{size:?}: {name}");
+            }
         }
     }
 }

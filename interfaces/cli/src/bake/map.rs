@@ -133,6 +133,7 @@ impl<'a> Sheet<'a> {
             steps,
             source,
             relief: self.relief.as_ref(),
+            symbols: None,
             theme: self.args.theme(),
         }
     }

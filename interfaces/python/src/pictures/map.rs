@@ -144,6 +144,7 @@ impl Map {
             steps: steps.clone(),
             source,
             relief: relief.as_ref(),
+            symbols: None,
             theme: if dark { Theme::Dark } else { Theme::Light },
         };
         let size = size.map_or_else(|| sheet.usual_size(), |(width, height)| [width, height]);
