@@ -11,17 +11,20 @@ use antumbra_bake::{
 };
 use antumbra_image::atomic_write_seeking;
 use antumbra_lab::count;
-use antumbra_raster::{Grid, Quantity};
+use antumbra_raster::{Grid, Quantity, Site};
 use antumbra_terrain::Share;
 use clap::{ArgGroup, Args, ValueEnum};
 
 use super::command::{Bake, Baking, Done, Figure, Named};
 use super::files::{self, Column, Format};
+use super::map;
 use super::places::{self, Places};
 use super::raster;
 use super::site::Asked;
 use super::terrain::is_terrain;
-use crate::args::{ChunkArgs, PlaceArgs, RasterArgs, SCENE, heading, rasters_long, values};
+use crate::args::{
+    ChunkArgs, MapArgs, PlaceArgs, RasterArgs, SCENE, heading, rasters_long, values,
+};
 use crate::exit::{Failure, tell};
 use crate::input::check_answers;
 use crate::interrupt;
@@ -71,12 +74,12 @@ impl Shown {
 pub struct HorizonArgs {
     #[arg(required = true, help = SCENE, long_help = rasters_long())]
     pub scene: Vec<PathBuf>,
-    /// Result: .csv, .npz or .tif
+    /// Result: .csv, .npz, .tif, .png, .svg or .pdf
     ///
     /// May be given several times. A .csv has a line per sensor and a column per azimuth, such as horizon_090. An .npz has the
     /// array horizon, sensors x azimuths, with azimuths and points. A .tif (GeoTIFF) has a band, and a .npy a plane, for each azimuth of
-    /// the --cells of a raster, or the value of --show. An .asc, or a raster of a --grid, has one azimuth (--azimuths 1). A shard is a
-    /// .part.
+    /// the --cells of a raster, or the value of --show. An .asc, or a raster of a --grid, has one azimuth (--azimuths 1). A .png, .svg or
+    /// .pdf is a map of one azimuth or of --show, of --cells; beside a .png is a .pgw, the world file for GIS programs. A shard is a .part.
     #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
     /// Angles, or how open the sky is
@@ -87,6 +90,8 @@ pub struct HorizonArgs {
     /// end of the run says how much values of the next coarser lattice, or of every second azimuth, differ.
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = Shown::Angles, hide_possible_values = true, help_heading = heading::OUTPUT)]
     pub show: Shown,
+    #[command(flatten)]
+    pub map: MapArgs,
     #[command(flatten)]
     pub raster: RasterArgs,
     /// Figures as JSON; - is the standard output
@@ -163,16 +168,23 @@ impl HorizonArgs {
 
 impl Baking for HorizonArgs {
     fn check(&self) -> Result<(), Failure> {
-        let sentence = "horizons are written as csv, npz, tif, asc or npy";
+        let sentence = "horizons are written as csv, npz, tif, asc, npy, png, svg or pdf";
         for path in &self.output {
-            let known = ["csv", "npz", "tif", "tiff", "asc", "npy"];
-            if Format::of(path, &known, sentence)? != Format::Raster {
-                continue;
+            let known = [
+                "csv", "npz", "tif", "tiff", "asc", "npy", "png", "svg", "pdf",
+            ];
+            match Format::of(path, &known, sentence)? {
+                Format::Raster => places::check_raster(path, &self.places, &self.scene)?,
+                Format::Picture if !self.is_of_cells() => {
+                    let reason = "a map of horizons needs --cells of a height raster";
+                    return Err(Failure::name(path, reason));
+                }
+                Format::Picture => {}
+                _ => continue,
             }
-            places::check_raster(path, &self.places, &self.scene)?;
             let is_one = self.azimuths() == Azimuths::Even(1) || self.show != Shown::Angles;
             if !(is_one || self.is_of_cells() && has_planes(path)) {
-                let reason = "an .asc, or a raster of a --grid, has one azimuth: --azimuths 1 with --first; .tif, .npy and .npz of --cells have all";
+                let reason = "a map, an .asc, or a raster of a --grid has one azimuth: --azimuths 1 with --first; .tif, .npy and .npz of --cells have all";
                 return Err(Failure::name(path, reason));
             }
         }
@@ -189,6 +201,7 @@ impl Baking for HorizonArgs {
                 "--first is for azimuths that are evenly spread, and a lattice has its own";
             return Err(Failure::Usage(reason.into()));
         }
+        self.map.check()?;
         places::check(&self.places)
     }
 
@@ -232,7 +245,8 @@ impl Baking for HorizonArgs {
 fn of_cells(args: &HorizonArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
     let terrain = bake.terrain(&mut files)?;
     let start = Instant::now();
-    terrain.settle(&Asked::new(&args.raster, &args.places))?;
+    let site = terrain.settle(&Asked::new(&args.raster, &args.places))?;
+    map::check_cells(&terrain, args.output.iter())?;
     let field = terrain.field()?;
     let (grid, values) = (
         terrain.grid(args.raster.crs.as_ref()),
@@ -288,7 +302,14 @@ fn of_cells(args: &HorizonArgs, bake: &Bake<'_>, mut files: Files) -> Result<(),
     let sensors = terrain.sensors(0.0);
     let rows = (&sensors, terrain.local(), found.as_deref());
     horizon.write(bake, rows, |path, _, bands| {
-        raster::write_values(path, &grid, planes, bands)
+        match Format::of_sensors(path)? {
+            Format::Picture => {
+                let place = (north, Some(args.places.units.metres()));
+                let sheet = map::Sheet::of_cells(&args.map, &terrain, place)?;
+                sheet.write(path, &horizon.words(args, site), planes)
+            }
+            _ => raster::write_values(path, &grid, planes, bands),
+        }
     })?;
     horizon.end(bake, (all, quadrature_error), &done, || ())
 }
@@ -373,6 +394,33 @@ impl Horizon<'_> {
         let sky = job.sky(measure, &progress)?;
         progress.finish();
         Ok(Done::whole(sky, start.elapsed().as_secs_f64()))
+    }
+
+    /// Words of a map.
+    fn words<'a>(&self, args: &'a HorizonArgs, site: Option<Site>) -> map::Words<'a> {
+        let (quantity, unit) = match self.show {
+            Shown::Angles => ("Elevation of the horizon", "degrees"),
+            Shown::SkyView => ("Sky view factor", ""),
+            Shown::SkyOpen => ("Open part of the hemisphere", ""),
+            Shown::Openness => ("Openness", "degrees"),
+        };
+        let of = match self.azimuths {
+            [azimuth] => format!("azimuth {azimuth}"),
+            all => format!("{} azimuths", all.len()),
+        };
+        let place = site.map(|site| map::place(site.latitude, site.longitude));
+        map::Words {
+            title: format!("{quantity}, {}", self.name),
+            subtitle: [Some(of), place]
+                .into_iter()
+                .flatten()
+                .collect::<Vec<_>>()
+                .join("  ·  "),
+            quantity,
+            unit: unit.to_owned(),
+            none: None,
+            files: vec![&args.scene],
+        }
     }
 
     /// Number of values of each sensor.

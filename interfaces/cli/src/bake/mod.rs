@@ -10,7 +10,7 @@
 //! - `ground`, `parts`, `places`, `view`: scenes, names of their triangles, and points of them;  `terrain`: height rasters without either
 //! - `neighbours`: tiles beside a height raster
 //! - `chunks`: files of unfinished work and of shares
-//! - `files`: formats and writers of results;  `map`: maps of grids;  `raster`: results as GeoTIFF, .asc and .npy
+//! - `files`: formats and writers of results;  `map`: maps of grids and cells;  `raster`: results as GeoTIFF, .asc and .npy
 
 mod ao;
 pub mod chunks;

@@ -248,7 +248,7 @@ fn terrain_says_where_a_scene_is_and_must_be_there() {
             .replace(" 0\n", " 190\n"),
     );
     apart("high.obj", "z 190 to 200, and the terrain");
-    let refused: [(&[&str], &str); 8] = [
+    let refused: [(&[&str], &str); 7] = [
         (
             &["map.obj", "--surfaces", "2", "--crs", "EPSG:25833"],
             "gdalwarp -t_srs EPSG:25833",
@@ -266,7 +266,6 @@ fn terrain_says_where_a_scene_is_and_must_be_there() {
             &["map.obj", "--cells", "-o", "a.ply"],
             "--output .ply: not with --cells",
         ),
-        (&["map.obj", "--cells", "-o", "a.png"], "a map needs --grid"),
         (&["map.obj", "--cells", "--vertices"], "cannot be used with"),
         (
             &["map.obj", "--surfaces", "2", "--terrain", "map.obj"],

@@ -15,7 +15,7 @@
 //! - `describing`: `info`
 //! - `looking`: viewers, what is said meanwhile, and the standard input
 //! - `occlusion`: `ao`;  `sunlight`: `sun`;  `sight`: `visible`
-//! - `terrain`: height rasters and viewsheds;  `around`: terrain around a scene;  `placing`: sensors on surfaces, and times of `sun`
+//! - `terrain`: height rasters and viewsheds;  `mapping`: maps of their cells;  `around`: terrain around a scene;  `placing`: sensors on surfaces, and times of `sun`
 //! - `grouping`: results by object and facade, elevations, moving shadows; `factors`;  `horizons`: `horizon`
 //! - `book`: links, tables and code of the pages for readers
 //! - `looks`: meshes with materials, camera flags, layers, pictures for displays
@@ -39,6 +39,7 @@ mod inputs;
 mod killing;
 mod looking;
 mod looks;
+mod mapping;
 mod occlusion;
 mod outputs;
 mod placing;

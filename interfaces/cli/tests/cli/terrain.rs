@@ -424,7 +424,7 @@ fn heights_and_angles_of_a_wall_are_those_of_its_shadow() {
     for (more, word) in [
         (
             &["--show", "height", "-o", "a.npz"][..],
-            "a.npz: --show height is written as tif, asc, npy or csv",
+            "a.npz: --show height is written as tif, asc, npy, csv, png, svg or pdf",
         ),
         (
             &["--show", "angle", "-o", "a.tif", "--grid", "20"],

@@ -72,15 +72,14 @@ impl Baked<'_> {
         let hourly = Hourly::new(self.sunlight)?;
         let suns = &self.sunlight.suns;
         let steps = steps(&hourly)?;
-        let plan = self.plan()?;
-        let sheet = map::Sheet::new(&self.args.map, &plan, self.sensors)?;
+        let sheet = self.sheet()?;
         let draw = |step: usize| -> Result<Drawing, Failure> {
             let sun = hourly.sun(step).unwrap_or_default();
             let lit = (0..self.sensors.points.len()).map(|row| {
                 let is_lit = found.suns_seen.get(row, sun);
                 if is_lit { 1.0 } else { 0.0 }
             });
-            let lit: Vec<f32> = lit.collect();
+            let lit = self.of_cells(lit.collect());
             let begin = hourly.begin(step).unix(0.0);
             let middle = Moment::at_unix(begin + 1800.0 * suns.hours[sun], 0.0);
             let words = self.words(("Sunlight", ""), Some(map::moment(&middle)));

@@ -29,6 +29,7 @@ use clap::{ArgGroup, Args};
 use super::command::{Bake, Baking, Done, Figure, Named};
 use super::files::Format;
 use super::ground::Ground;
+use super::map;
 use super::parts::By;
 use super::places::{self, Places};
 use super::site::Asked;
@@ -55,8 +56,8 @@ pub struct SunArgs {
     /// Result: .csv, .ply, .npz, .png, .svg, .pdf or .tif
     ///
     /// May be given several times. A .csv has a line per sensor, a .ply the mesh or the sensors in colours, a .png, .svg
-    /// or .pdf a map of a --grid, and an .npz all values with the visibility matrices. Beside a .png is a .pgw, the world file
-    /// for GIS programs. A .tif (GeoTIFF), .asc or .npy has the value of --show in the cells of a --grid or of a scene that is a
+    /// or .pdf a map of a --grid or of the --cells of a height raster, and an .npz all values with the visibility matrices. Beside
+    /// a .png is a .pgw, the world file for GIS programs. A .tif (GeoTIFF), .asc or .npy has the value of --show in the cells of a --grid or of a scene that is a
     /// raster. A shard is a .part.
     #[arg(short, long, value_name = "OUT", required = true, value_parser = checked::output_file(), help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
@@ -91,7 +92,7 @@ pub struct SunArgs {
     /// Moving shadows: .gif, or .png for each step
     ///
     /// A map of each step of time with a sun above the horizon, with its time in the title. A .gif has them all. Of NAME.png, the
-    /// files are NAME-0001.png and so on. Needs --grid.
+    /// files are NAME-0001.png and so on. Needs --grid, or --cells of a height raster.
     #[arg(long, value_name = "FILE", value_parser = checked::output_file(), conflicts_with = "shard", help_heading = heading::OUTPUT)]
     pub frames: Option<PathBuf>,
     /// Figures as JSON; - is the standard output
@@ -213,8 +214,9 @@ impl Baking for SunArgs {
     fn check(&self) -> Result<(), Failure> {
         for path in &self.output {
             match Format::of_sensors(path)? {
-                Format::Picture if self.places.grid.is_none() => {
-                    return Err(Failure::name(path, "a map needs --grid"));
+                Format::Picture if !self.has_maps() => {
+                    let reason = "a map needs --grid, or --cells of a height raster";
+                    return Err(Failure::name(path, reason));
                 }
                 Format::Raster => places::check_raster(path, &self.places, self.raster_scene())?,
                 _ => {}
@@ -222,8 +224,9 @@ impl Baking for SunArgs {
         }
         places::check(&self.places)?;
         when::check(self)?;
-        if self.frames.is_some() && self.places.grid.is_none() {
-            return Err(Failure::Usage("--frames: maps need --grid".into()));
+        if self.frames.is_some() && !self.has_maps() {
+            let reason = "--frames: maps need --grid, or --cells of a height raster";
+            return Err(Failure::Usage(reason.into()));
         }
         self.frames.as_deref().map(frames::is_gif).transpose()?;
         self.groups.as_deref().map(groups::is_table).transpose()?;
@@ -258,9 +261,7 @@ impl Baking for SunArgs {
             false => &self.terrain,
         });
         let weather = self.epw.as_deref().map(read_weather).transpose()?;
-        if self.places.vertices && is_terrain(self.raster_scene(), self.places.up)
-            || self.has_terrain_cells()
-        {
+        if self.is_of_cells() {
             return self.of_cells(bake, (weather.as_ref(), begin), files);
         }
         let terrain =
@@ -318,6 +319,17 @@ impl Baking for SunArgs {
 }
 
 impl SunArgs {
+    /// Whether sensors are the cells of a height raster.
+    fn is_of_cells(&self) -> bool {
+        let is_terrain = || is_terrain(self.raster_scene(), self.places.up);
+        self.has_terrain_cells() || self.places.vertices && is_terrain()
+    }
+
+    /// Whether sensors are on a map.
+    fn has_maps(&self) -> bool {
+        self.places.grid.is_some() || self.is_of_cells()
+    }
+
     /// Whether sensors are the cells of `--terrain`.
     fn has_terrain_cells(&self) -> bool {
         self.places.cells && !self.terrain.is_empty()
@@ -350,7 +362,10 @@ impl SunArgs {
             Some((ground, up)) => around::settle(self, (ground, *up), &terrain)?,
             None => terrain.settle(&Asked::new(&self.raster, &self.places))?,
         };
+        map::check_cells(&terrain, self.output.iter().chain(&self.frames))?;
         let (when, sunlight) = When::at(self, weather, site, UpAxis::Z)?;
+        let mut frames = self.frames.iter();
+        frames.try_for_each(|path| frames::declare(path, &sunlight, &mut files))?;
         let has_mesh = town.is_none() && (self.groups.is_some() || self.writes(&["ply"]));
         let ground = has_mesh.then(|| bake.ground(&mut files, None));
         let ground = ground.transpose()?.map(|mut ground| {
@@ -416,7 +431,7 @@ impl SunArgs {
 
     /// Computes all of a job with little memory.
     fn whole(&self, job: &FieldSunJob<'_>, name: &str) -> Result<Done<SunFound>, Failure> {
-        let keeps = self.writes(&["npz"]) || self.hourly.is_some();
+        let keeps = self.writes(&["npz"]) || self.hourly.is_some() || self.frames.is_some();
         input::check_answers(name, job.memory(keeps))?;
         let (start, progress) = (Instant::now(), Progress::new(name));
         let found = job.whole(keeps, &progress);

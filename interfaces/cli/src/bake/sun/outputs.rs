@@ -8,7 +8,7 @@ use antumbra_raster::Quantity;
 use super::Baked;
 use super::values::{Shown, Value};
 use crate::bake::files::{self, Column, Format};
-use crate::bake::{map, raster};
+use crate::bake::raster;
 use crate::exit::Failure;
 
 impl Baked<'_> {
@@ -23,14 +23,14 @@ impl Baked<'_> {
             Format::Picture => {
                 let time = (args.show != Shown::SkyView).then(|| self.period());
                 let words = self.words((shown.title, shown.unit_on_maps()), time);
-                let plan = self.plan()?;
-                map::Sheet::new(&args.map, &plan, sensors)?.write(path, &words, &shown.singles())
+                let values = self.of_cells(shown.singles());
+                self.sheet()?.write(path, &words, &values)
             }
             Format::Raster => {
                 let (values, crs) = (shown.singles(), args.raster.crs.as_ref());
                 let quantity = Quantity { name, unit };
                 if let Some(terrain) = self.terrain {
-                    let values = terrain.spread(&values);
+                    let values = self.of_cells(values);
                     return raster::write_values(path, &terrain.grid(crs), &values, &[quantity]);
                 }
                 let place = (crs, args.places.units.metres());
@@ -45,6 +45,14 @@ impl Baked<'_> {
                 let values = (name, &shown.singles()[..]);
                 files::coloured(path, values, sensors, mesh, (up, args.map.colours()))
             }
+        }
+    }
+
+    /// Values of all cells, if sensors are the cells of a raster that have data.
+    pub fn of_cells(&self, values: Vec<f32>) -> Vec<f32> {
+        match self.terrain {
+            Some(terrain) => terrain.spread(&values),
+            None => values,
         }
     }
 

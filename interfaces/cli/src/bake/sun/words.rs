@@ -1,11 +1,9 @@
 //! Words of maps: value, place and time.
 
-use std::path::PathBuf;
-
 use antumbra_bake::{Clock, Moment, Place};
 
 use super::Baked;
-use crate::bake::map::{self, Plan, Words};
+use crate::bake::map::{self, Plan, Sheet, Words};
 use crate::exit::Failure;
 
 impl Baked<'_> {
@@ -36,31 +34,34 @@ impl Baked<'_> {
         if let Some(name) = &args.places.only {
             title += &format!(", {name}");
         }
-        let files = [args.scene.first(), args.epw.as_ref()];
         Words {
             title,
             subtitle: subtitle.join("  ·  "),
             quantity,
-            unit,
-            whole: false,
-            files: files.into_iter().flatten().map(PathBuf::as_path).collect(),
+            unit: unit.to_owned(),
+            none: None,
+            files: vec![&args.scene, &args.terrain, args.epw.as_slice()],
         }
     }
 
-    /// Where the grid of maps is.
-    pub fn plan(&self) -> Result<Plan<'_>, Failure> {
+    /// A sheet for maps of sensors on a grid, or of the cells of a raster.
+    pub fn sheet(&self) -> Result<Sheet<'_>, Failure> {
+        let (args, places) = (&self.args.map, &self.args.places);
+        let (north, metres) = (places.north.degrees(), places.units.metres());
+        if let Some(terrain) = self.terrain {
+            return Sheet::of_cells(args, terrain, (north, Some(metres)));
+        }
         let (ground, sensors) = self.mesh()?;
-        let places = &self.args.places;
-        let metres = places.units.metres();
-        Ok(Plan {
+        let plan = Plan {
             ground,
             bvh: sensors.bvh(ground),
             orientation: &sensors.plan,
             up: self.up,
             cell: places.grid.unwrap_or_default() / metres,
-            north: places.seen_from.is_none().then_some(places.north.degrees()),
+            north: places.seen_from.is_none().then_some(north),
             metres: Some(metres),
-        })
+        };
+        Sheet::new(args, &plan, self.sensors)
     }
 
     /// The time that values are of, as maps write it.

@@ -70,8 +70,9 @@ pub struct VisibleArgs {
     ///
     /// May be given several times. An .npz has the matrix as bits with the counts, a .csv the count of every point of A (of a
     /// viewshed: of every place), a .ply the points of A or the mesh in colours, and a .png, .svg or .pdf a map of
-    /// --viewshed with --grid. Beside a .png is a .pgw, the world file for GIS programs. A .tif (GeoTIFF), .asc or .npy has the
-    /// counts in the cells of a --grid, or the value of --show in the cells of a scene that is a raster. A shard is a .part.
+    /// --viewshed, with --grid or of the cells of a height raster, on which observers have symbols. Beside a .png is a .pgw, the
+    /// world file for GIS programs. A .tif (GeoTIFF), .asc or .npy has the counts in the cells of a --grid, or the value of --show in
+    /// the cells of a scene that is a raster. A shard is a .part.
     #[arg(short, long, value_name = "OUT", required = true, value_parser = values::output_file(), help_heading = heading::OUTPUT)]
     pub output: Vec<PathBuf>,
     /// Value of cells of a height raster
@@ -142,8 +143,10 @@ impl Baking for VisibleArgs {
         let has_cells = self.viewshed && (self.grid.is_some() || raster::is_raster(&self.scene));
         for path in &self.output {
             match Format::of_sensors(path)? {
-                Format::Picture if self.grid.is_none() => {
-                    return Err(Failure::name(path, "a map needs --viewshed with --grid"));
+                Format::Picture if self.grid.is_none() && !viewshed::is_of_cells(self) => {
+                    let reason =
+                        "a map needs --viewshed, with --grid or of the cells of a height raster";
+                    return Err(Failure::name(path, reason));
                 }
                 Format::Raster if !has_cells => {
                     let reason =
@@ -384,28 +387,69 @@ fn write(
                 raster::write(path, ground, (rows, &values), crs, (plan.up, quantity))
             }
             Format::Picture => {
-                let unit = args.units.known().map(unit_name);
-                let unit = unit.map_or_else(String::new, |unit| format!(" {unit}"));
-                let words = Words {
-                    title: format!("Viewshed, {}", ground.loaded.scene.name),
-                    subtitle: format!(
-                        "{} observers, eyes {}{unit} and targets {}{unit} above their places",
-                        count(observers.points.len() as u64),
-                        args.eye,
-                        args.target
-                    ),
-                    quantity: "Observers that see the place",
-                    unit: "",
-                    whole: true,
-                    files: vec![&args.scene[0], &args.from],
+                let words = words(args, &ground.loaded.scene.name, observers.points.len());
+                let level = Orientation::new(plan.up, 0.0).map_err(Failure::usage)?;
+                let place = |&point: &[f32; 3]| {
+                    let [x, y, _] = level.local(local.world(point));
+                    [x, y]
                 };
-                map::Sheet::new(&args.map, plan, rows)?.write(path, &words, &values)
+                let sheet = map::Sheet::new(&args.map, plan, rows)?;
+                let sheet = sheet.observed(observers.points.iter().map(place));
+                sheet.write(path, &words, &values)
             }
             Format::Ply | Format::Glb => {
                 let level = ([0.0; 3], args.map.colours());
                 files::coloured(path, (name, &values), rows, (&ground.mesh, local), level)
             }
         })
+}
+
+/// Words of a map.
+fn words<'a>(args: &'a VisibleArgs, scene: &str, observers: usize) -> Words<'a> {
+    let lengths = args.units.known().map(unit_name).unwrap_or_default();
+    let of = if lengths.is_empty() { "" } else { " " };
+    let of = format!("{of}{lengths}");
+    let (title, quantity, unit, none) = match args.show {
+        Shown::SeenBy => (
+            "Viewshed",
+            "Observers that see the place",
+            String::new(),
+            Some("not seen"),
+        ),
+        Shown::Height => (
+            "Height that is seen",
+            "Least height above ground that an observer sees",
+            lengths,
+            None,
+        ),
+        Shown::Angle => (
+            "Elevation of sight",
+            "Least elevation of lines of sight",
+            "degrees".to_owned(),
+            None,
+        ),
+    };
+    let plural = if observers == 1 { "" } else { "s" };
+    let mut subtitle = format!(
+        "{} observer{plural}, eyes {}{of}",
+        count(observers as u64),
+        args.eye
+    );
+    subtitle += &match args.show {
+        Shown::Height => " above their places".to_owned(),
+        _ => format!(" and targets {}{of} above their places", args.target),
+    };
+    if let Some(radius) = args.radius {
+        subtitle += &format!(", within {radius}{of}");
+    }
+    Words {
+        title: format!("{title}, {scene}"),
+        subtitle,
+        quantity,
+        unit,
+        none,
+        files: vec![&args.scene, std::slice::from_ref(&args.from)],
+    }
 }
 
 /// Writes a matrix as arrays, with the places of its rows and columns.

@@ -12,8 +12,8 @@ use super::lines::{self, Ends};
 use super::{Shown, Sight, VisibleArgs};
 use crate::bake::command::{Bake, Done};
 use crate::bake::files::{self, Column, Format};
-use crate::bake::raster;
 use crate::bake::terrain::{Terrain, is_terrain};
+use crate::bake::{map, raster};
 use crate::exit::{Failure, tell};
 use crate::output::Files;
 use crate::progress::Progress;
@@ -37,8 +37,9 @@ pub fn check(args: &VisibleArgs) -> Result<(), Failure> {
         return Err(Failure::Usage(reason));
     }
     for path in &args.output {
-        if !matches!(Format::of_sensors(path)?, Format::Raster | Format::Csv) {
-            let reason = format!("--show {show} is written as tif, asc, npy or csv");
+        let format = Format::of_sensors(path)?;
+        if !matches!(format, Format::Raster | Format::Csv | Format::Picture) {
+            let reason = format!("--show {show} is written as tif, asc, npy, csv, png, svg or pdf");
             return Err(Failure::name(path, reason));
         }
     }
@@ -49,7 +50,8 @@ pub fn check(args: &VisibleArgs) -> Result<(), Failure> {
 pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
     let terrain = bake.terrain(&mut files)?;
     terrain.tell_read();
-    terrain.settle(&super::asked(args))?;
+    let site = terrain.settle(&super::asked(args))?;
+    map::check_cells(&terrain, args.output.iter())?;
     let start = Instant::now();
     let field = terrain.field()?;
     let build_seconds = start.elapsed().as_secs_f64();
@@ -91,7 +93,8 @@ pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), 
         })?,
     };
     if let Some(values) = &done.found {
-        write(args, &terrain, &table, values, seen.as_ref())?;
+        let north = site.map_or(0.0, |site| site.north);
+        write(args, (&terrain, north), &table, values, seen.as_ref())?;
     }
     let sight = Sight {
         name: &terrain.name,
@@ -182,7 +185,7 @@ impl Table {
 /// Writes all files: values of cells, and who sees them.
 fn write(
     args: &VisibleArgs,
-    terrain: &Terrain,
+    (terrain, north): (&Terrain, f64),
     table: &Table,
     values: &[f32],
     seen: Option<&Viewsheds>,
@@ -202,6 +205,15 @@ fn write(
             Format::Raster => {
                 let grid = terrain.grid(args.raster.crs.as_ref());
                 raster::write_values(path, &grid, values, &[quantity])?;
+            }
+            Format::Picture => {
+                let place = (north, args.units.known());
+                let sheet = map::Sheet::of_cells(&args.map, terrain, place)?;
+                let sheet = sheet.observed(table.points.iter().map(|&[x, y, _]| [x, y]));
+                let words = super::words(args, &terrain.name, table.points.len());
+                // Where no height helps, there is none.
+                let finite = |&value: &f32| if value.is_finite() { value } else { f32::NAN };
+                sheet.write(path, &words, &values.iter().map(finite).collect::<Vec<_>>())?;
             }
             format => others.push((path, format)),
         }
