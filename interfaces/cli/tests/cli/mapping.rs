@@ -36,7 +36,7 @@ fn place(grid: &Grid) -> Place {
         name: "height",
         unit: "m",
     };
-    let bytes = write("dem.tif".as_ref(), grid, &heights, quantity).expect("a raster");
+    let bytes = write("dem.tif".as_ref(), grid, &heights, &[quantity]).expect("a raster");
     place.write("dem.tif", bytes);
     let mut eyes = "x,y\n".to_owned();
     for [column, row] in EYES {
