@@ -35,6 +35,40 @@ def town(n=512):
     return z, 1
 
 
+def old_town(n=512):
+    """Blocks of 4 to 6 storeys with pitched roofs and courts between crooked streets of 3 to 6 m, on a slope, cells of a metre."""
+    random = np.random.default_rng(11)
+    row, column = np.mgrid[:n, :n].astype(float)
+    ground = 0.07 * row + 0.04 * column + 6 * fractal(n, 4.2, 4)
+    y, x = np.mgrid[-1 : n // 45 + 2, -1 : n // 45 + 2].reshape(2, -1) * 45 + random.uniform(-11, 11, (2, (n // 45 + 3) ** 2))
+    block = np.argmin([(column - a) ** 2 + (row - b) ** 2 for a, b in zip(x, y)], axis=0)
+    street = random.uniform(3, 6, (x.size, x.size))
+    # The nearest street of a cell runs halfway between two centres of blocks, a house every 11 m along it.
+    away, house = np.full((n, n), np.inf), np.zeros((n, n), int)
+    for k in range(x.size):
+        across, down = x[k] - x[block], y[k] - y[block]
+        length = np.hypot(across, down) + (block == k)
+        here, there = column - (x[block] + x[k]) / 2, row - (y[block] + y[k]) / 2
+        distance = -(here * across + there * down) / length - street[np.minimum(block, k), np.maximum(block, k)] / 2
+        nearer = (distance < away) & (block != k)
+        away[nearer] = distance[nearer]
+        house[nearer] = ((block * x.size + k) * 64 + 32 + (here * down - there * across) / length // 11)[nearer]
+    house = np.unique(house, return_inverse=True)[1].reshape(n, n)
+    floor = (np.bincount(house.ravel(), ground.ravel()) / np.bincount(house.ravel()))[house]
+    eaves = floor + 3.2 * random.integers(4, 7, house.max() + 1)[house]
+    depth = random.uniform(9, 13, house.max() + 1)[house]
+    pitch = np.tan(np.radians(random.uniform(40, 55, house.max() + 1)))[house]
+    square = np.bincount(block.ravel()).argmax()
+    built = (away > 0) & (away < depth) & (block != square)
+    z = np.where(built, eaves + pitch * np.minimum(away, depth - away), ground)
+    # The largest block is a square with a church, whose tower is 60 m high.
+    east, north = column - x[square], y[square] - row
+    u, v = east * np.cos(0.3) + north * np.sin(0.3), np.abs(north * np.cos(0.3) - east * np.sin(0.3))
+    foot = ground[block == square].mean()
+    z = np.where((u > -10) & (u < 16) & (v < 7), foot + 13 + 1.3 * (7 - v), z)
+    return np.where((u > -18) & (u <= -10) & (v < 4), foot + 44 + 4 * (4 - np.maximum(np.abs(u + 14), v)), z), 1
+
+
 def alps(n=256):
     return fractal(n, 4.0, 1) * 2000, 20
 
@@ -70,7 +104,7 @@ def write(path, z, cell, left=EAST, top=NORTH):
 def make(folder, new_zealand_file):
     """Writes all terrains; returns their paths by name."""
     os.makedirs(folder, exist_ok=True)
-    made = {"tower": tower(), "town": town(), "ridge": ridge(), "alps": alps()}
+    made = {"tower": tower(), "town": town(), "old-town": old_town(), "ridge": ridge(), "alps": alps()}
     if new_zealand_file:
         made["new-zealand"] = new_zealand(new_zealand_file)
     paths = {name: os.path.join(folder, name + ".tif") for name in made}
