@@ -96,18 +96,18 @@ def new_zealand(path, n=700):
 
 
 def write(path, z, cell, left=EAST, top=NORTH):
+    os.makedirs(os.path.dirname(path), exist_ok=True)
     profile = dict(driver="GTiff", height=z.shape[0], width=z.shape[1], count=1, dtype="float32", crs="EPSG:32633")
     with rasterio.open(path, "w", transform=from_origin(left, top, cell, cell), **profile) as file:
         file.write(z.astype(np.float32), 1)
 
 
 def make(folder, new_zealand_file):
-    """Writes all terrains; returns their paths by name."""
-    os.makedirs(folder, exist_ok=True)
+    """Writes all terrains; returns their paths by name. Each has its own folder, since the program looks at rasters beside its scene."""
     made = {"tower": tower(), "town": town(), "old-town": old_town(), "ridge": ridge(), "alps": alps()}
     if new_zealand_file:
         made["new-zealand"] = new_zealand(new_zealand_file)
-    paths = {name: os.path.join(folder, name + ".tif") for name in made}
+    paths = {name: os.path.join(folder, name, name + ".tif") for name in made}
     for name, (z, cell) in made.items():
         write(paths[name], z, cell, EAST - z.shape[1] // 2 * cell, NORTH + z.shape[0] // 2 * cell)
     return paths

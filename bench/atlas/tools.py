@@ -93,7 +93,7 @@ def ours_lit(t, azimuth, altitude):
 
 def mirrored(t):
     """The raster with west and east exchanged: its triangles are those of the other diagonal."""
-    path = t.file("mirrored.tif")
+    path = t.file("mirrored/mirrored.tif")
     write(path, t.z[:, ::-1], t.cell, t.box.left, t.box.top)
     return Terrain(t.name, path)
 
@@ -128,7 +128,7 @@ def tiles(t, rim, answer):
         for column in range(0, t.z.shape[1], 256):
             top, left = max(row - rim, 0), max(column - rim, 0)
             cut = t.z[top : row + 256 + rim, left : column + 256 + rim]
-            path = t.file("tile.tif")
+            path = t.file("tile/tile.tif")
             write(path, cut, t.cell, t.box.left + left * t.cell, t.box.top - top * t.cell)
             found, took, command = answer(Terrain("tile", path))
             if joined is None:
