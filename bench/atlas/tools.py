@@ -65,7 +65,9 @@ def raster(path):
 
 def ours_horizons(t, azimuths, first=0.0):
     out = t.file("horizon.npy")
-    took = run(ANTUMBRA, "horizon", t.path, "--cells", "--azimuths", azimuths, "--first", repr(first), "--threads", 1, "-o", out)
+    # Azimuths from grid north, which tiles share.
+    directions = ["--azimuths", azimuths, "--first", repr(first), "--north", 0]
+    took = run(ANTUMBRA, "horizon", t.path, "--cells", *directions, "--threads", 1, "-o", out)
     return np.load(out, mmap_mode="r").reshape(-1, *t.z.shape), *took
 
 
