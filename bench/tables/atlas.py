@@ -5,8 +5,8 @@ import os
 
 from tables.texts import RECORDS
 
-ATLAS = "zen3-2026-11-28-atlas.json"
-TERRAINS = {"tower": "tower", "town": "town", "ridge": "ridge", "alps": "alps", "new-zealand": "New Zealand"}
+ATLAS = "xeon-2026-11-28-atlas.json"
+TERRAINS = {"tower": "tower", "town": "town", "old-town": "old town", "ridge": "ridge", "alps": "alps", "new-zealand": "New Zealand"}
 
 
 def rows(question):
@@ -82,9 +82,9 @@ def checks():
 
 
 def seconds():
-    """CPU seconds of each question on two terrains, the program in the first row of each."""
+    """CPU seconds of each question on three terrains, the program in the first row of each."""
     names = {"horizon": "horizons", "viewshed": "viewsheds", "shadow": "shadows", "hours": "hours", "sky": "sky view"}
-    chosen = ("town", "new-zealand")
+    chosen = ("town", "old-town", "new-zealand")
     table = []
     for question, name in names.items():
         for tool, found in sorted(rows(question).items(), key=lambda row: row[0] != "antumbra"):

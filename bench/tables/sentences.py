@@ -9,7 +9,7 @@ import os
 import re
 import statistics
 
-from tables import texts
+from tables import atlas, texts
 from tables.texts import spaced
 
 ROOT = os.path.join(os.path.dirname(os.path.abspath(__file__)), "..", "..")
@@ -26,7 +26,7 @@ ORDER, EMBREE = (f"docs/src/{n}.md" for n in ("occlusion-order", "order-in-embre
 BAKING = tuple(f"docs/src/{n}.md" for n in ("occlusion-baking", "bakes", "sun-and-sky", "visibility", "rasters", "horizons"))
 PYTHON = ("docs/src/python/index.md", "docs/src/python/scenes.md")
 RELIABILITY, BENCH = "docs/src/reliability.md", "bench/performance.md"
-MOVING = "docs/src/moving-scenes.md"
+MOVING, ATLAS = "docs/src/moving-scenes.md", "docs/src/atlas.md"
 LONG = "bench/results.md"
 
 
@@ -45,6 +45,7 @@ def computed(of):
     yield from baked(of)
     yield from packages(of)
     yield from moving(of)
+    yield from of_the_atlas()
 
 
 def counted(of):
@@ -298,6 +299,11 @@ def moving(of):
     yield MOVING, f"Instances take {min(instances):.1f} to {max(instances):.1f} times as long"
 
 
+def of_the_atlas():
+    seen = atlas.rows("viewshed")["antumbra"]["old-town"]["seen"]
+    yield ATLAS, f"In the old town the eyes see {100 * seen:.1f} % of the cells"
+
+
 # The source of each figure that is not computed above: (text of the page, file or one of KINDS, what the file has).
 SOURCES = {
     MOVING: [
@@ -306,7 +312,7 @@ SOURCES = {
         ("at least 200 000 triangles", "science/bench/src/calls/motion.rs", "builtin:city:200000"),
         ("each instance 5120", "science/bench/src/calls/motion.rs", "icosphere(4)"),
     ],
-    "docs/src/atlas.md": [
+    ATLAS: [
         ("GeoTIFFs in EPSG:32633", "bench/atlas/terrains.py", "EPSG:32633"),
         ("400 horizons and 1000 lines of sight for each terrain", "setting"),
         ("2000 m from the lowest to the highest cell", "bench/atlas/terrains.py", "fractal(n, 4.0, 1) * 2000"),
