@@ -13,7 +13,7 @@ use crate::exit::tell;
 use crate::progress::doing;
 
 /// Cells whose horizons are compared, if all of them have data, and azimuths of each.
-const CELLS: u32 = 1024;
+const CELLS: u32 = 256;
 const AZIMUTHS: u32 = 32;
 
 /// Degrees of elevation by which horizons differ, and how many of them are below the zenith.

@@ -278,7 +278,11 @@ fn what_no_map_can_show_is_refused() {
             65,
             "gdalwarp",
         ),
-        (&horizon, 2, "a map, an .asc, or a raster of a --grid has one azimuth"),
+        (
+            &horizon,
+            2,
+            "a map, an .asc, or a raster of a --grid has one azimuth",
+        ),
         (
             &[
                 "horizon",

@@ -118,7 +118,7 @@ fn a_tile_alone_knows_how_many_of_its_cells_see_more() {
         .and_then(|(part, _)| part.parse().ok())
         .expect(&said);
     assert!(
-        (1.0..99.0).contains(&part) && (part - 100.0 * higher).abs() < 3.0,
+        (1.0..99.0).contains(&part) && (part - 100.0 * higher).abs() < 8.0,
         "{part} % of {higher}"
     );
     // All cells east of the wall see it, and no line between two cells leaves a raster.
