@@ -175,39 +175,70 @@ impl<'a> Cog<'a> {
         let ([width, height], page) = (self.tile, &self.pages[level]);
         let [left, top] = [tile % page.tiles[0] * width, tile / page.tiles[0] * height];
         let mut encoder = ZlibEncoder::new(Vec::new(), LEVEL);
-        let mut line = vec![0; 4 * width];
+        let (mut means, mut sums) = (vec![f32::NAN; width], Default::default());
+        let (mut line, mut packed) = (vec![0; 4 * width], vec![0; 4 * width]);
         for row in top..top + height {
-            for column in 0..width {
-                let value = self.mean(values, level, [left + column, row]);
-                for (place, byte) in value.to_be_bytes().into_iter().enumerate() {
-                    line[place * width + column] = byte;
+            means.fill(f32::NAN);
+            self.means(values, level, [left, row], &mut means, &mut sums);
+            for (place, bytes) in line.chunks_exact_mut(width).enumerate() {
+                for (byte, mean) in bytes.iter_mut().zip(&means) {
+                    *byte = (mean.to_bits() >> (24 - 8 * place)) as u8;
                 }
             }
-            for at in (1..line.len()).rev() {
-                line[at] = line[at].wrapping_sub(line[at - 1]);
+            packed[0] = line[0];
+            for ((packed, byte), before) in packed[1..].iter_mut().zip(&line[1..]).zip(&line) {
+                *packed = byte.wrapping_sub(*before);
             }
-            encoder.write_all(&line)?;
+            encoder.write_all(&packed)?;
         }
         encoder.finish()
     }
 
-    /// Mean of the cells with data that a cell of a page covers; NaN, always of the same bits, where there are none.
-    fn mean(&self, values: &[f32], level: usize, [column, row]: [usize; 2]) -> f32 {
-        let (width, height) = (self.grid.width, self.grid.height);
-        let [columns, rows] = [(column, width), (row, height)]
-            .map(|(at, end)| (at << level).min(end)..((at + 1) << level).min(end));
+    /// Means of the cells with data that cells of a row of a page cover, from the first column on and as far as there are any; NaN,
+    /// always of the same bits, without data. `sums` is room for sums and counts of columns.
+    fn means(
+        &self,
+        values: &[f32],
+        level: usize,
+        first: [usize; 2],
+        means: &mut [f32],
+        sums: &mut [Vec<f64>; 2],
+    ) {
+        let (size, counts) = ([self.grid.width, self.grid.height], [means.len(), 1]);
+        let [columns, rows] = [0, 1].map(|axis| {
+            let ends = [first[axis], first[axis] + counts[axis]];
+            let [start, end] = ends.map(|at| (at << level).min(size[axis]));
+            start..end
+        });
+        let line = |row: usize| &values[row * size[0]..][columns.clone()];
+        if level == 0 {
+            for (mean, &value) in means.iter_mut().zip(rows.flat_map(line)) {
+                *mean = if value.is_nan() { f32::NAN } else { value };
+            }
+            return;
+        }
+        let [sums, counts] = sums;
         // The sum of a negative zero is one, too.
-        let (mut sum, mut count) = (-0.0, 0.0);
+        for (list, start) in [(&mut *sums, -0.0), (&mut *counts, 0.0)] {
+            list.clear();
+            list.resize(columns.len(), start);
+        }
         for row in rows {
-            for &value in &values[row * width..][columns.clone()] {
-                if !value.is_nan() {
-                    sum += f64::from(value);
-                    count += 1.0;
-                }
+            for ((sum, count), &value) in sums.iter_mut().zip(counts.iter_mut()).zip(line(row)) {
+                *sum += f64::from(if value.is_nan() { -0.0 } else { value });
+                *count += if value.is_nan() { 0.0 } else { 1.0 };
             }
         }
-        let mean = (sum / count) as f32;
-        if mean.is_nan() { f32::NAN } else { mean }
+        let cells = sums.chunks(1 << level).zip(counts.chunks(1 << level));
+        for (mean, (sums, counts)) in means.iter_mut().zip(cells) {
+            let sum = sums.iter().fold(-0.0, |all, sum| all + sum);
+            let count = counts.iter().fold(0.0, |all, count| all + count);
+            *mean = if count > 0.0 {
+                (sum / count) as f32
+            } else {
+                f32::NAN
+            };
+        }
     }
 
     /// All before the tiles.
