@@ -34,8 +34,12 @@ fn cells_are_lit_where_their_horizon_is_below_the_light() {
     let mut counts = [0; 2];
     for round in 0..160 {
         let mut unit = || f64::from(random.unit());
-        let size = [0, 1].map(|_| 1 + (unit() * 70.0) as usize);
-        let holes = if round % 3 == 0 { 0.0 } else { 0.1 * unit() };
+        let mut size = [0, 1].map(|_| 1 + (unit() * 70.0) as usize);
+        if round % 8 == 6 {
+            size[round / 8 % 2] = 1;
+        }
+        // So many that cells are far from all others, in a third of the rounds.
+        let holes = [0.0, 0.1, 0.7][round % 3] * unit();
         let rise = if round % 5 == 0 { unit() } else { 0.0 };
         let heights = plain(&mut random, size[0] * size[1], holes);
         let field = HeightField::new(size, &heights, transforms[round % 4]).expect("a field");

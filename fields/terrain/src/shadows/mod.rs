@@ -179,10 +179,12 @@ impl Grid {
         let mut gaps = Vec::new();
         if field.has_holes() {
             let chunks = columns.div_ceil(LANES);
+            // A single row has no data around it, which is no cell without data.
+            let known = if joined.is_empty() { &heights } else { &joined };
             gaps = memory::filled("gaps", rows * chunks, false)?;
             for row in 0..rows {
                 for index in 0..chunks {
-                    let own = &heights[row * stride + PAD + LANES * index..];
+                    let own = &known[row * stride + PAD + LANES * index..];
                     let count = LANES.min(columns - LANES * index);
                     if own[..count].iter().any(|height| height.is_nan()) {
                         // Crossings near a cell are at most so many rows and columns away.
@@ -218,12 +220,19 @@ impl Grid {
     }
 }
 
-/// Cells with data that have neighbours in a row, a column or a diagonal to which no triangle joins them.
+/// Cells with data that have neighbours in a row, a column or a diagonal to which no triangle joins them, or no neighbours.
 fn loose(field: &HeightField<'_>) -> Vec<usize> {
     let mut loose: Vec<usize> = field.wires().iter().flatten().copied().collect();
     let [width, height] = field.size();
     let has = |cell: usize| field.heights()[cell].is_finite();
     if field.has_holes() {
+        let is_single = |&cell: &usize| {
+            let (column, row) = (cell % width, cell / width);
+            has(cell)
+                && !(column > 0 && has(cell - 1) || column + 1 < width && has(cell + 1))
+                && !(row > 0 && has(cell - width) || row + 1 < height && has(cell + width))
+        };
+        loose.extend((0..width * height).filter(is_single));
         for row in 1..height {
             for last in row * width + 1..(row + 1) * width {
                 let first = last - width - 1;
