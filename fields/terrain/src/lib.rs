@@ -9,6 +9,7 @@
 //! | which azimuths have such steps, and how much of the circle is each | [`Lattice`] | steps, degrees, weights |
 //! | how much of the sky does each cell see | [`FieldSky`] | a number for each cell |
 //! | which cells get light from a direction | [`Shadows::lit`] | a bit for each cell |
+//! | horizons and light in tiles of a raster that is too large for memory | [`Pull`] | as of the whole raster |
 //! | is a light hidden at any place above the surface | [`Skyline::hides`] | yes or no |
 //! | which cells does an observer see | [`Viewer::sees`] | a bit for each cell |
 //! | from which height above ground does an observer see them | [`Viewer::target_heights`] | a number for each cell |
@@ -37,6 +38,7 @@
 //!
 //! - `height_field`: heights as a surface of triangles;  `lattice`: steps and their azimuths
 //! - `sweep`, `march`: horizons;  `sky`: sums over them;  `shadows`, `skyline`: light from far away;  `viewshed`: viewsheds
+//! - `tiles`: parts of larger rasters
 //! - `crossing`: crossings of lines of sight with edges
 //! - `angles`: degrees;  `monitor`: progress and cancellation;  `memory`: lists that may not fit;  `error`: why there is no result
 #![forbid(unsafe_code)]
@@ -55,13 +57,14 @@ mod shadows;
 mod sky;
 mod skyline;
 mod sweep;
+mod tiles;
 mod viewshed;
 
 pub use angles::degrees;
 pub use error::Error;
 pub use height_field::{HeightField, Observer};
 pub use lattice::{Direction, Lattice, weights};
-pub use march::March;
+pub use march::{Eyes, March, Peaks};
 pub use monitor::Monitor;
 #[doc(hidden)]
 pub use monitor::{Progress, Share};
@@ -69,4 +72,5 @@ pub use shadows::{Shadows, per_cell};
 pub use sky::{FieldSky, SkyMeasure, SkyValues};
 pub use skyline::{Light, Skyline};
 pub use sweep::Sweep;
+pub use tiles::{Pull, Pulled, Tile, Tiles};
 pub use viewshed::{Limits, Viewer};

@@ -17,14 +17,19 @@
 //! mipmaps for fast, accurate, and scalable dynamic height field rendering"). Neighbours mostly look at the same peak, so a walk
 //! begins with the stretch of the last square's horizon: then nearly all others are below it. The answer is the largest slope of all
 //! crossings, whatever was left out.
+//!
+//! Bounds need no slack. The height at a crossing is never rounded to more than both ends of its edge have, since a crossing is
+//! off both by more than rounding ([`edge_at`](crate::crossing::edge_at)). From there on, a slope and its bound are the same
+//! operations, on numbers of which the bound has the larger ones, and rounding keeps their order.
 
 use std::ops::Range;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use antumbra_simd::{Dispatch, Isa, Simd, Width, WithSimd};
 use rayon::prelude::*;
 
 use crate::angles::check_azimuths;
-use crate::crossing::{Crossing, is_edge};
+use crate::crossing::{Crossing, Lines, is_edge};
 use crate::{Error, HeightField, Monitor, Progress, memory};
 
 /// Cells on a side of the squares of each level. Cells of one of the smallest are walked from together.
@@ -34,8 +39,19 @@ const SIDE: usize = 8;
 /// Cells on a side of the tiles whose squares are walked from one after the other, such that they read the same heights.
 const TILE: usize = 64;
 
-/// Slopes by which a stretch must be below the horizon: more than its bound is rounded.
-const SLACK: f64 = 1e-12;
+/// Columns or rows between a field and those who see it, up to which distances are known to parts of a cell.
+pub(crate) const FAR: u64 = 1 << 28;
+
+/// Cells from which is looked, which may be beside the field: a tile of the same raster.
+#[derive(Clone, Copy, Debug)]
+pub struct Eyes<'a> {
+    /// Heights of the cells, row by row; NaN where there is no eye.
+    pub heights: &'a [f64],
+    /// Number of columns.
+    pub width: usize,
+    /// Column and row of the first cell, where the first cell of the field is at 0, 0.
+    pub at: [i64; 2],
+}
 
 /// Horizons of all cells of a height field in any azimuth.
 pub struct March<'a> {
@@ -52,12 +68,12 @@ impl<'a> March<'a> {
     /// # Errors
     /// [`Error::NoMemory`].
     pub fn new(field: &'a HeightField<'a>, rise: f64, drop: f64) -> Result<Self, Error> {
-        let [small, middle, large] = SIDES.map(|side| Peaks::new(field, side, 0));
+        let levels = Peaks::of_squares(field, SIDE, 0)?.levels()?;
         Ok(Self {
             field,
             rise,
             drop,
-            levels: [small?, middle?, large?],
+            levels,
         })
     }
 
@@ -83,81 +99,281 @@ impl<'a> March<'a> {
         of: impl Fn(f64) -> f32 + Sync,
         monitor: &dyn Monitor,
     ) -> Result<Vec<f32>, Error> {
-        check_azimuths(&[azimuth])?;
         let [width, height] = self.field.size();
-        let way = Way::new(self, azimuth);
+        let eyes = Eyes {
+            heights: self.field.heights(),
+            width,
+            at: [0; 2],
+        };
         let mut found = memory::filled("horizons", width * height, f32::NAN)?;
-        let rows = found.par_chunks_mut(TILE * width).enumerate();
-        let progress = Progress::new(monitor, height.div_ceil(TILE));
-        rows.try_for_each(|(index, found)| {
-            if monitor.cancelled() {
-                return Err(Error::Cancelled);
-            }
-            Isa::best().dispatch(Band {
-                march: self,
-                way: &way,
-                row: index * TILE,
-                of: &of,
-                found,
-            });
-            progress.add(1);
-            Ok(())
-        })?;
+        let start = |_: &f32| f64::NEG_INFINITY;
+        self.walk(&eyes, azimuth, (start, of), &mut found, monitor)?;
         Ok(found)
+    }
+
+    /// Raises slopes of horizons so far, one for each eye, to what this field is as a part of their horizon.
+    ///
+    /// So the horizons of a tile of a larger raster have the bits that the whole raster gives if each square of four cells is in
+    /// one of the fields that raise them, in any order. Fields may overlap. They are equal in the shape of cells, but where their
+    /// transforms begin does not count.
+    ///
+    /// # Errors
+    /// As of [`March::horizons`]; [`Error::Length`] if there are not as many slopes as eyes or they have no whole rows,
+    /// [`Error::Range`] if they are more than 2^28 columns or rows away.
+    ///
+    /// ```
+    /// use antumbra_terrain::{Eyes, HeightField, March, degrees};
+    ///
+    /// // Cells of a plain, and two columns of the tile in the east of it, of which the first one is theirs.
+    /// let transform = [0.0, 1.0, 0.0, 0.0, 0.0, -1.0];
+    /// let field = HeightField::new([2, 2], &[0.0, 2.0, 0.0, 2.0], transform)?;
+    /// let eyes = Eyes { heights: &[0.0; 6], width: 3, at: [-2, 0] };
+    /// let mut slopes = [f64::NEG_INFINITY; 6];
+    /// March::new(&field, 0.0, 0.0)?.raise(&eyes, 90.0, &mut slopes, &())?;
+    /// assert_eq!(slopes[1..3].iter().map(|&slope| degrees(slope)).collect::<Vec<_>>(), [45.0, 63.434948]);
+    /// # Ok::<(), antumbra_terrain::Error>(())
+    /// ```
+    pub fn raise(
+        &self,
+        eyes: &Eyes<'_>,
+        azimuth: f64,
+        slopes: &mut [f64],
+        monitor: &dyn Monitor,
+    ) -> Result<(), Error> {
+        eyes.check(slopes)?;
+        self.walk(eyes, azimuth, (|&own| own, |own| own), slopes, monitor)
+    }
+
+    fn walk<T: Send>(
+        &self,
+        eyes: &Eyes<'_>,
+        azimuth: f64,
+        ends: (impl Fn(&T) -> f64 + Sync, impl Fn(f64) -> T + Sync),
+        found: &mut [T],
+        monitor: &dyn Monitor,
+    ) -> Result<(), Error> {
+        check_azimuths(&[azimuth])?;
+        let (field, size) = (self.field, self.field.size());
+        let lines = eyes.lines(field.step(azimuth), ([0; 2], size));
+        let look = Look {
+            goal: Goal::Surface(field),
+            levels: &self.levels,
+            rise: self.rise,
+            drop: self.drop,
+            way: &Way::new(&lines, field.has_holes(), size[0]),
+            eyes,
+        };
+        look.walk(ends, found, monitor)
     }
 }
 
-/// Largest height in each square of a level, row by row.
-pub(crate) struct Peaks {
-    columns: usize,
-    rows: usize,
+impl Eyes<'_> {
+    /// Lines of sight along a step to so many cells from a column and row on.
+    pub(crate) fn lines(&self, step: [f64; 2], cells: ([isize; 2], [usize; 2])) -> Lines {
+        let eyes = [self.width, self.heights.len() / self.width];
+        let at = self.at.map(|at| at as isize);
+        Lines::new(step, (at, eyes), cells)
+    }
+
+    /// Marks the squares of a field whose peaks may be above one of the horizons so far, along such lines of sight to its cells.
+    pub(crate) fn mark(
+        &self,
+        (levels, marks): (&[Peaks; 3], &[AtomicBool]),
+        lines: &Lines,
+        [rise, drop]: [f64; 2],
+        slopes: &mut [f64],
+        monitor: &dyn Monitor,
+    ) -> Result<(), Error> {
+        let look = Look {
+            goal: Goal::Marks(marks),
+            levels,
+            rise,
+            drop,
+            // Beside holes there are more edges, which does not matter elsewhere.
+            way: &Way::new(lines, true, 0),
+            eyes: self,
+        };
+        look.walk((|&own: &f64| own, |own| own), slopes, monitor)
+    }
+
+    /// Refuses slopes that are not one for each eye.
+    fn check(&self, slopes: &[f64]) -> Result<(), Error> {
+        let is_in = self.width > 0;
+        Error::check_range("columns of eyes", self.width as f64, is_in, "at least 1")?;
+        let rows = self.heights.len() / self.width;
+        Error::check_length("heights of eyes", self.heights.len(), rows * self.width)?;
+        Error::check_length("slopes", slopes.len(), self.heights.len())?;
+        let far = self.at[0].unsigned_abs().max(self.at[1].unsigned_abs());
+        let is_in = far <= FAR;
+        let wanted = "at most 2^28 columns or rows between a field and those who see it";
+        Error::check_range("column or row of eyes", far as f64, is_in, wanted)
+    }
+}
+
+/// Largest height in each square of a field, row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Peaks {
+    /// Cells on a side, a power of two.
+    side: usize,
+    size: [usize; 2],
+    /// Numbers from row to row.
+    stride: usize,
     peaks: Vec<f64>,
 }
 
 impl Peaks {
-    /// Peaks of squares with so many cells on a side, and `more` cells of the next ones.
-    pub fn new(field: &HeightField<'_>, side: usize, more: usize) -> Result<Self, Error> {
-        let [width, height] = field.size();
+    /// Peaks of the squares of a field with so many cells on a side, the first of which begins at its first cell.
+    ///
+    /// # Errors
+    /// [`Error::Range`] if the side is no power of two; [`Error::NoMemory`].
+    pub fn new(field: &HeightField<'_>, side: usize) -> Result<Self, Error> {
+        Self::of_squares(field, side, 0)
+    }
+
+    /// Peaks of a field of this size that [`Peaks::values`] gave, or larger ones, such as those rounded up to single precision.
+    ///
+    /// # Errors
+    /// [`Error::Length`] if there are not as many as squares, and as of [`Peaks::new`].
+    pub fn from_values(size: [usize; 2], side: usize, values: &[f64]) -> Result<Self, Error> {
+        let mut all = Self::none(size, side)?;
+        let [columns, rows] = all.size;
+        Error::check_length("peaks", values.len(), columns * rows)?;
+        let own = all.peaks.chunks_mut(all.stride);
+        for (own, values) in own.zip(values.chunks(columns.max(1))) {
+            own[..columns].copy_from_slice(values);
+        }
+        Ok(all)
+    }
+
+    /// The peak of each square, row by row; minus infinity where there is no data.
+    pub fn values(&self) -> Vec<f64> {
+        let rows = self.peaks.chunks(self.stride);
+        rows.flat_map(|row| &row[..self.size[0]]).copied().collect()
+    }
+
+    /// No peaks yet for squares with so many cells on a side.
+    fn none([width, height]: [usize; 2], side: usize) -> Result<Self, Error> {
+        let wanted = "a power of two";
+        Error::check_range(
+            "side of squares",
+            side as f64,
+            side.is_power_of_two(),
+            wanted,
+        )?;
+        let size = [width.div_ceil(side), height.div_ceil(side)];
         // No power of two from row to row, which would crowd few sets of a cache.
-        let columns = width.div_ceil(side) | 1;
-        let rows = height.div_ceil(side);
-        let mut peaks = memory::filled("peaks", columns * rows, f64::NEG_INFINITY)?;
+        let stride = size[0] | 1;
+        let peaks = memory::filled("peaks", stride * size[1], f64::NEG_INFINITY)?;
+        Ok(Self {
+            side,
+            size,
+            stride,
+            peaks,
+        })
+    }
+
+    /// Peaks of squares with so many cells on a side, and `more` cells of the next ones.
+    pub(crate) fn of_squares(
+        field: &HeightField<'_>,
+        side: usize,
+        more: usize,
+    ) -> Result<Self, Error> {
+        let size @ [width, _] = field.size();
+        let mut all = Self::none(size, side)?;
         for (row, heights) in field.heights().chunks_exact(width).enumerate() {
             for square in row.saturating_sub(more) / side..=row / side {
-                let peaks = &mut peaks[square * columns..][..columns];
-                for (index, peak) in peaks.iter_mut().take(width.div_ceil(side)).enumerate() {
+                let peaks = &mut all.peaks[square * all.stride..][..all.size[0]];
+                for (index, peak) in peaks.iter_mut().enumerate() {
                     let heights = &heights[index * side..width.min((index + 1) * side + more)];
                     // NaN does not count.
                     *peak = heights.iter().fold(*peak, |peak, &height| peak.max(height));
                 }
             }
         }
-        Ok(Self {
-            columns,
-            rows,
-            peaks,
-        })
+        Ok(all)
     }
 
-    pub fn bytes(&self) -> usize {
+    /// Peaks for stretches of each level, as fine as these are.
+    pub(crate) fn levels(self) -> Result<[Self; 3], Error> {
+        let [_, middle, large] = SIDES;
+        let middle = self.coarser(middle)?;
+        let large = middle.coarser(large)?;
+        Ok([self, middle, large])
+    }
+
+    /// Peaks of squares with at least so many cells on a side.
+    fn coarser(&self, side: usize) -> Result<Self, Error> {
+        let count = side / self.side;
+        if count < 2 {
+            return Ok(self.clone());
+        }
+        let mut all = Self::none(self.size, count)?;
+        all.side = side;
+        for (row, peaks) in self.peaks.chunks_exact(self.stride).enumerate() {
+            let coarse = &mut all.peaks[row / count * all.stride..];
+            for (peaks, coarse) in peaks[..self.size[0]].chunks(count).zip(coarse) {
+                *coarse = peaks.iter().fold(*coarse, |peak, &own| peak.max(own));
+            }
+        }
+        Ok(all)
+    }
+
+    pub(crate) fn bytes(&self) -> usize {
         size_of_val(&self.peaks[..])
     }
 
-    /// The peak of all squares that have cells of some columns and rows, as far as there are any.
+    /// Cells on a side of the squares.
+    pub(crate) fn side(&self) -> usize {
+        self.side
+    }
+
+    /// Numbers of columns and rows of squares.
+    pub(crate) fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// The number of the square that has a cell, unless the cell is beside the field, and its peak.
     #[inline(always)]
-    pub fn most(&self, side: usize, [columns, rows]: [Range<isize>; 2]) -> f64 {
-        // Sides are powers of two.
-        let shift = side.trailing_zeros();
-        let squares = |cells: Range<isize>, count: usize| {
+    fn around(&self, cell: [isize; 2]) -> Option<(usize, f64)> {
+        let [column, row] = cell.map(|at| (at >> self.side.trailing_zeros()) as usize);
+        let is_in = column < self.size[0] && row < self.size[1];
+        is_in.then(|| {
+            (
+                row * self.size[0] + column,
+                self.peaks[row * self.stride + column],
+            )
+        })
+    }
+
+    /// Columns and rows of all squares that have cells of some columns and rows, as far as there are any.
+    #[inline(always)]
+    fn ranges(&self, cells: [Range<isize>; 2]) -> [Range<usize>; 2] {
+        let shift = self.side.trailing_zeros();
+        let squares = |cells: &Range<isize>, count: usize| {
             let first = (cells.start >> shift).max(0) as usize;
             let end = (((cells.end - 1) >> shift) + 1).max(0) as usize;
             first..end.min(count)
         };
-        let columns = squares(columns, self.columns);
+        [
+            squares(&cells[0], self.size[0]),
+            squares(&cells[1], self.size[1]),
+        ]
+    }
+
+    /// Numbers of these squares.
+    fn squares(&self, cells: [Range<isize>; 2]) -> impl Iterator<Item = usize> {
+        let ([columns, rows], count) = (self.ranges(cells), self.size[0]);
+        rows.flat_map(move |row| columns.clone().map(move |column| row * count + column))
+    }
+
+    /// The largest of their peaks.
+    #[inline(always)]
+    pub(crate) fn most(&self, cells: [Range<isize>; 2]) -> f64 {
+        let [columns, rows] = self.ranges(cells);
         let mut most = f64::NEG_INFINITY;
-        for row in squares(rows, self.rows) {
+        for row in rows {
             for column in columns.clone() {
-                most = most.max(self.peaks[row * self.columns + column]);
+                most = most.max(self.peaks[row * self.stride + column]);
             }
         }
         most
@@ -168,7 +384,7 @@ impl Peaks {
 struct Stretch {
     /// Crossings, or stretches of the level below.
     parts: Range<usize>,
-    /// Columns and rows from the eye to all ends of edges.
+    /// Columns and rows of all ends of edges, as the first eye sees them.
     offsets: [Range<isize>; 2],
     /// Least and largest distance, and their reciprocals.
     distances: [f64; 2],
@@ -179,30 +395,33 @@ struct Stretch {
 struct Way {
     /// Whether lines pass more rows than columns.
     is_steep: bool,
+    /// Columns and rows of the cells that are seen.
+    cells: [Range<isize>; 2],
     crossings: Vec<Crossing>,
     /// Stretches of 8 cells, of 64 and of 512.
     stretches: [Vec<Stretch>; 3],
 }
 
 impl Way {
-    fn new(march: &March<'_>, azimuth: f64) -> Self {
-        let crossings = Crossing::all(march.field, azimuth, f64::INFINITY);
-        let small = Self::small(&crossings);
+    fn new(lines: &Lines, has_holes: bool, width: usize) -> Self {
+        let crossings = lines.crossings(has_holes, width, f64::INFINITY);
+        let small = Self::small(&crossings, lines.at);
         let middle = Self::larger(&small, SIDES[1] / SIDES[0]);
         let large = Self::larger(&middle, SIDES[2] / SIDES[1]);
-        let [columns, rows] = march.field.step(azimuth);
+        let [columns, rows] = lines.step;
         Self {
             is_steep: rows.abs() > columns.abs(),
+            cells: lines.cells.clone(),
             crossings,
             stretches: [small, middle, large],
         }
     }
 
     /// Stretches of as many columns or rows as squares have.
-    fn small(crossings: &[Crossing]) -> Vec<Stretch> {
+    fn small(crossings: &[Crossing], [column, row]: [isize; 2]) -> Vec<Stretch> {
         let piece = |crossing: &Crossing| {
-            let [column, row] = crossing.ends[0];
-            column.abs().max(row.abs()) / SIDE as isize
+            let [end, other] = crossing.ends[0];
+            (end - column).abs().max((other - row).abs()) / SIDE as isize
         };
         let mut stretches = Vec::new();
         let mut first = 0;
@@ -245,29 +464,103 @@ impl Way {
     }
 }
 
-/// Rows of tiles, whose squares are walked from one after the other.
-struct Band<'a, Of> {
-    march: &'a March<'a>,
-    way: &'a Way,
-    /// The first row.
-    row: usize,
-    of: &'a Of,
-    found: &'a mut [f32],
+/// What eyes look for: the surface of a field, or marks of squares of a field of which only peaks are known.
+enum Goal<'a> {
+    Surface(&'a HeightField<'a>),
+    Marks(&'a [AtomicBool]),
 }
 
-impl<Of: Fn(f64) -> f32> WithSimd<SIDE> for Band<'_, Of> {
+/// What eyes look at.
+struct Look<'a> {
+    goal: Goal<'a>,
+    levels: &'a [Peaks; 3],
+    rise: f64,
+    drop: f64,
+    way: &'a Way,
+    eyes: &'a Eyes<'a>,
+}
+
+impl<'a> Look<'a> {
+    /// Walks from all eyes with the slopes that `start` makes of what was found, and puts there what `of` makes of the slopes
+    /// then.
+    fn walk<T: Send>(
+        &self,
+        (start, of): (impl Fn(&T) -> f64 + Sync, impl Fn(f64) -> T + Sync),
+        found: &mut [T],
+        monitor: &dyn Monitor,
+    ) -> Result<(), Error> {
+        let rows = found.par_chunks_mut(TILE * self.eyes.width).enumerate();
+        let progress = Progress::new(monitor, rows.len());
+        rows.try_for_each(|(index, found)| {
+            if monitor.cancelled() {
+                return Err(Error::Cancelled);
+            }
+            Isa::best().dispatch(Band {
+                look: self,
+                row: index * TILE,
+                start: &start,
+                of: &of,
+                found,
+            });
+            progress.add(1);
+            Ok(())
+        })
+    }
+
+    /// The square of this column and row, whose cells have the slopes of a list that begins with the row.
+    #[inline(always)]
+    fn square<T>(
+        &'a self,
+        [column, row]: [usize; 2],
+        slopes: &[T],
+        of: impl Fn(&T) -> f64,
+    ) -> Square<'a> {
+        let mut square = Square {
+            look: self,
+            column,
+            row,
+            eyes: [[f64::NAN; SIDE]; SIDE],
+            most: [[f64::NEG_INFINITY; SIDE]; SIDE],
+            hint: 0,
+        };
+        let Eyes { heights, width, .. } = *self.eyes;
+        let columns = SIDE.min(width - column);
+        let rows = slopes.chunks(width).take(SIDE).enumerate();
+        for (line, slopes) in rows {
+            let heights = &heights[(row + line) * width + column..][..columns];
+            let slopes = &slopes[column..][..columns];
+            for lane in 0..columns {
+                square.eyes[line][lane] = heights[lane] + self.rise;
+                square.most[line][lane] = of(&slopes[lane]);
+            }
+        }
+        square
+    }
+}
+
+/// Rows of tiles, whose squares are walked from one after the other.
+struct Band<'a, T, Start, Of> {
+    look: &'a Look<'a>,
+    /// The first row.
+    row: usize,
+    start: &'a Start,
+    of: &'a Of,
+    found: &'a mut [T],
+}
+
+impl<T, Start: Fn(&T) -> f64, Of: Fn(f64) -> T> WithSimd<SIDE> for Band<'_, T, Start, Of> {
     type Output = ();
 
     #[inline(always)]
     fn with_simd<S: Simd + Width<SIDE>>(mut self, _: S) {
-        let [width, _] = self.march.field.size();
+        let width = self.look.eyes.width;
         let rows = (self.found.len() / width).div_ceil(SIDE);
         let mut hint = 0;
         for first in (0..width).step_by(TILE) {
             let columns = TILE.min(width - first).div_ceil(SIDE);
             for index in 0..columns * rows {
                 // Along the lines, as far as squares go.
-                let [column, row] = match self.way.is_steep {
+                let [column, row] = match self.look.way.is_steep {
                     true => [index / rows, index % rows],
                     false => [index % columns, index / columns],
                 };
@@ -277,39 +570,24 @@ impl<Of: Fn(f64) -> f32> WithSimd<SIDE> for Band<'_, Of> {
     }
 }
 
-impl<Of: Fn(f64) -> f32> Band<'_, Of> {
+impl<T, Start: Fn(&T) -> f64, Of: Fn(f64) -> T> Band<'_, T, Start, Of> {
     /// Walks from the square of this column, and of this row of the band.
     #[inline(always)]
     fn square(&mut self, [column, first]: [usize; 2], hint: usize) -> usize {
-        let field = self.march.field;
-        let [width, _] = field.size();
-        let mut square = Square {
-            march: self.march,
-            way: self.way,
-            column,
-            row: self.row + first,
-            eyes: [[f64::NAN; SIDE]; SIDE],
-            most: [[f64::NEG_INFINITY; SIDE]; SIDE],
-            hint,
-        };
-        let columns = SIDE.min(width - column);
-        let rows = SIDE.min(self.found.len() / width - first);
-        for row in 0..rows {
-            let heights = &field.heights()[(square.row + row) * width + column..][..columns];
-            for (eye, height) in square.eyes[row].iter_mut().zip(heights) {
-                *eye = height + self.march.rise;
-            }
-        }
-        if self.march.rise < 0.0 {
+        let look = self.look;
+        let width = look.eyes.width;
+        let found = &mut self.found[first * width..];
+        let mut square = look.square([column, self.row + first], found, self.start);
+        square.hint = hint;
+        if look.rise < 0.0 {
             square.most = [[f64::INFINITY; SIDE]; SIDE];
         } else {
             square.all();
         }
-        for row in 0..rows {
-            for lane in 0..columns {
+        for (row, found) in found.chunks_mut(width).take(SIDE).enumerate() {
+            for (lane, found) in found[column..].iter_mut().take(SIDE).enumerate() {
                 if !square.eyes[row][lane].is_nan() {
-                    self.found[(first + row) * width + column + lane] =
-                        (self.of)(square.most[row][lane]);
+                    *found = (self.of)(square.most[row][lane]);
                 }
             }
         }
@@ -319,8 +597,7 @@ impl<Of: Fn(f64) -> f32> Band<'_, Of> {
 
 /// Cells of a square, and their horizons so far.
 struct Square<'a> {
-    march: &'a March<'a>,
-    way: &'a Way,
+    look: &'a Look<'a>,
     column: usize,
     row: usize,
     /// Heights of eyes; NaN where there is none.
@@ -334,22 +611,58 @@ struct Square<'a> {
 impl Square<'_> {
     #[inline(always)]
     fn all(&mut self) {
-        if let Some(stretch) = self.way.stretches[0].get(self.hint) {
-            self.take(self.hint, stretch, [true; SIDE]);
+        let stretches = &self.look.way.stretches;
+        if let (Goal::Surface(field), Some(stretch)) =
+            (&self.look.goal, stretches[0].get(self.hint))
+        {
+            let rows = self.rows_below(0, stretch);
+            self.take(field, self.hint, stretch, rows);
         }
-        for large in &self.way.stretches[2] {
+        for large in &stretches[2] {
             if self.rows_below(2, large) == [false; SIDE] {
                 continue;
             }
-            for middle in &self.way.stretches[1][large.parts.clone()] {
+            for middle in &stretches[1][large.parts.clone()] {
                 if self.rows_below(1, middle) == [false; SIDE] {
                     continue;
                 }
                 for index in middle.parts.clone() {
-                    let stretch = &self.way.stretches[0][index];
+                    let stretch = &stretches[0][index];
                     let rows = self.rows_below(0, stretch);
-                    if rows != [false; SIDE] {
-                        self.take(index, stretch, rows);
+                    if rows == [false; SIDE] {
+                        continue;
+                    }
+                    match self.look.goal {
+                        Goal::Surface(field) => self.take(field, index, stretch, rows),
+                        Goal::Marks(marks) => self.mark(marks, stretch, rows),
+                    }
+                }
+            }
+        }
+    }
+
+    /// Marks squares with ends of edges that a small stretch crosses, if their peaks may be above the horizon of an eye.
+    fn mark(&self, marks: &[AtomicBool], stretch: &Stretch, rows: [bool; SIDE]) {
+        let Look { way, levels, .. } = self.look;
+        let is_marked = |square: usize| marks[square].load(Ordering::Relaxed);
+        if levels[0].squares(self.windows(stretch)).all(is_marked) {
+            return;
+        }
+        let at = [self.column, self.row].map(|at| at as isize);
+        for crossing in &way.crossings[stretch.parts.clone()] {
+            let far = self.look.drop * crossing.distance;
+            for row in (0..SIDE).filter(|&row| rows[row]) {
+                for lane in 0..SIDE {
+                    let ends = crossing.ends.map(|[column, line]| {
+                        [at[0] + column + lane as isize, at[1] + line + row as isize]
+                    });
+                    let is_in =
+                        |axis: usize| ends.iter().all(|end| way.cells[axis].contains(&end[axis]));
+                    for (square, peak) in ends.into_iter().filter_map(|end| levels[0].around(end)) {
+                        let slope = (peak - self.eyes[row][lane]) * crossing.reciprocal - far;
+                        if slope > self.most[row][lane] && is_in(0) && is_in(1) {
+                            marks[square].store(true, Ordering::Relaxed);
+                        }
                     }
                 }
             }
@@ -359,11 +672,14 @@ impl Square<'_> {
     /// Rows of the square in which the horizon of a cell is below what the peak of a stretch may be.
     #[inline(always)]
     fn rows_below(&self, level: usize, stretch: &Stretch) -> [bool; SIDE] {
-        let peak = self.march.levels[level].most(SIDES[level], self.windows(stretch));
-        let lower = self.march.drop * stretch.distances[0] - SLACK;
+        let mut rows = [false; SIDE];
+        let peak = self.look.levels[level].most(self.windows(stretch));
+        if peak == f64::NEG_INFINITY {
+            return rows;
+        }
+        let lower = self.look.drop * stretch.distances[0];
         let [near, far] = stretch.reciprocals;
         // No closures: they would not be compiled for the CPU's vectors.
-        let mut rows = [false; SIDE];
         for row in 0..SIDE {
             let (eyes, most) = (&self.eyes[row], &self.most[row]);
             let mut is_below = false;
@@ -389,21 +705,26 @@ impl Square<'_> {
 
     /// Takes the crossings of a small stretch for some rows of the square.
     #[inline(always)]
-    fn take(&mut self, index: usize, stretch: &Stretch, rows: [bool; SIDE]) {
-        let field = self.march.field;
+    fn take(
+        &mut self,
+        field: &HeightField<'_>,
+        index: usize,
+        stretch: &Stretch,
+        rows: [bool; SIDE],
+    ) {
         let size = field.size().map(|size| size as isize);
         let windows = self.windows(stretch);
         let is_whole =
             (0..2).all(|axis| windows[axis].start >= 0 && windows[axis].end <= size[axis]);
-        let crossings = &self.way.crossings[stretch.parts.clone()];
+        let crossings = &self.look.way.crossings[stretch.parts.clone()];
         for row in (0..SIDE).filter(|&row| rows[row]) {
             let before = self.most[row];
             if is_whole && !field.has_holes() {
-                self.cross_all(row, crossings);
+                self.cross_all(field, row, crossings);
             } else {
                 // No closure, which would not be compiled for the CPU's vectors.
                 for crossing in crossings {
-                    self.cross(row, crossing);
+                    self.cross(field, row, crossing);
                 }
             }
             if before != self.most[row] {
@@ -414,10 +735,10 @@ impl Square<'_> {
 
     /// Takes crossings for the cells of a row, none of which leads out of the raster or beside a hole.
     #[inline(always)]
-    fn cross_all(&mut self, row: usize, crossings: &[Crossing]) {
+    fn cross_all(&mut self, field: &HeightField<'_>, row: usize, crossings: &[Crossing]) {
         let mut most = self.most[row];
         for crossing in crossings {
-            let slopes = self.slopes(row, crossing);
+            let slopes = self.slopes(field, row, crossing);
             for lane in 0..SIDE {
                 most[lane] = if slopes[lane] > most[lane] {
                     slopes[lane]
@@ -431,14 +752,14 @@ impl Square<'_> {
 
     /// Slopes to a crossing from the cells of a row, none of which leads out of the raster; NaN where an end has no data.
     #[inline(always)]
-    fn slopes(&self, row: usize, crossing: &Crossing) -> [f64; SIDE] {
-        let heights = self.march.field.heights();
-        let first = (self.row + row) * self.march.field.size()[0] + self.column;
+    fn slopes(&self, field: &HeightField<'_>, row: usize, crossing: &Crossing) -> [f64; SIDE] {
+        let heights = field.heights();
+        let first = (self.row + row) * field.size()[0] + self.column;
         let [a, b] = crossing.offsets.map(|offset| {
             let first = first.wrapping_add_signed(offset);
             &heights[first..first + SIDE]
         });
-        let lower = self.march.drop * crossing.distance;
+        let lower = self.look.drop * crossing.distance;
         let mut slopes = [0.0; SIDE];
         for lane in 0..SIDE {
             slopes[lane] = crossing.slope([a[lane], b[lane]], self.eyes[row][lane]) - lower;
@@ -448,8 +769,8 @@ impl Square<'_> {
 
     /// Takes a crossing for the cells of a row that have such an edge.
     #[inline(always)]
-    fn cross(&mut self, row: usize, crossing: &Crossing) {
-        let size = self.march.field.size().map(|size| size as isize);
+    fn cross(&mut self, field: &HeightField<'_>, row: usize, crossing: &Crossing) {
+        let size = field.size().map(|size| size as isize);
         let first = [self.column, self.row + row].map(|at| at as isize);
         let side = SIDE as isize;
         let (mut is_beside, mut is_whole) = (false, true);
@@ -463,8 +784,8 @@ impl Square<'_> {
         }
         let mut rises = !is_whole;
         if is_whole {
-            let slopes = self.slopes(row, crossing);
-            let (is_edge, is_known) = self.are_edges(row, crossing);
+            let slopes = self.slopes(field, row, crossing);
+            let (is_edge, is_known) = self.are_edges(field, row, crossing);
             let mut most = self.most[row];
             for lane in 0..SIDE {
                 let is_higher = is_edge[lane] & (slopes[lane] > most[lane]);
@@ -477,14 +798,19 @@ impl Square<'_> {
             }
         }
         if rises {
-            self.cross_each(row, crossing);
+            self.cross_each(field, row, crossing);
         }
     }
 
     /// Whether a triangle has the crossed edges with data, and whether this is known: neighbours may be wires, and corners by themselves.
     #[inline(always)]
-    fn are_edges(&self, row: usize, crossing: &Crossing) -> ([bool; SIDE], bool) {
-        let (field, mut are) = (self.march.field, [true; SIDE]);
+    fn are_edges(
+        &self,
+        field: &HeightField<'_>,
+        row: usize,
+        crossing: &Crossing,
+    ) -> ([bool; SIDE], bool) {
+        let mut are = [true; SIDE];
         let ([[a, b], [c, d]], width) = (crossing.ends, field.size()[0]);
         if !field.has_holes() {
             return (are, true);
@@ -508,8 +834,7 @@ impl Square<'_> {
 
     /// Takes a crossing for the cells of a row one after the other.
     #[inline(never)]
-    fn cross_each(&mut self, row: usize, crossing: &Crossing) {
-        let field = self.march.field;
+    fn cross_each(&mut self, field: &HeightField<'_>, row: usize, crossing: &Crossing) {
         let first = [self.column, self.row + row].map(|at| at as isize);
         for lane in 0..SIDE {
             let ends = crossing.ends.map(|[column, row]| {
@@ -518,7 +843,7 @@ impl Square<'_> {
             let [Some(a), Some(b)] = ends.map(|end| field.height_at(end)) else {
                 continue;
             };
-            let lower = self.march.drop * crossing.distance;
+            let lower = self.look.drop * crossing.distance;
             let slope = crossing.slope([a, b], self.eyes[row][lane]) - lower;
             let is_higher = slope > self.most[row][lane];
             if is_higher && (!field.has_holes() || is_edge(field, ends)) {

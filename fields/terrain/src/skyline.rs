@@ -9,7 +9,7 @@
 //! Stretches are divided by computed distances, and crossings near their ends belong to both. So rounding decides only how much is looked
 //! at. What counts are slopes of crossings, which at the centres of cells have the same bits as in `March`.
 
-use crate::crossing::{CLOSE, edge_at, floor, is_edge};
+use crate::crossing::{CLOSE, edge_at, floor, is_edge, is_twice};
 use crate::height_field::{Family, families};
 use crate::march::{Peaks, SIDES};
 use crate::{Error, HeightField, Observer, angles::check_azimuths};
@@ -60,12 +60,11 @@ impl<'a> Skyline<'a> {
     /// # Errors
     /// [`Error::NoMemory`].
     pub fn new(field: &'a HeightField<'a>) -> Result<Self, Error> {
-        let [small, middle, large] = SIDES.map(|side| Peaks::new(field, side, 1));
         let known = || field.heights().iter().filter(|height| height.is_finite());
         let largest = known().fold(0.0, |most: f64, height| most.max(height.abs()));
         Ok(Self {
             field,
-            levels: [small?, middle?, large?],
+            levels: Peaks::of_squares(field, SIDES[0], 1)?.levels()?,
             top: known().copied().fold(f64::NEG_INFINITY, f64::max),
             slack: SLACK * largest,
         })
@@ -191,7 +190,7 @@ impl<'a> Skyline<'a> {
             0 => [own..own + 1, across],
             _ => [across, own..own + 1],
         };
-        let peak = self.levels[level].most(SIDES[level], cells);
+        let peak = self.levels[level].most(cells);
         let nearest = ends[usize::from(ray.light.slope <= 0.0)];
         peak + self.slack - ray.height >= ray.least(nearest)
     }
@@ -217,6 +216,9 @@ impl<'a> Skyline<'a> {
             }
             let place = ray.beyond[axis] + distance * step[axis];
             let (ends, part) = edge_at(family, line, place);
+            if is_twice([u, v], ends) {
+                return false;
+            }
             let ends = ends.map(|[c, r]| [ray.cell[0] + c, ray.cell[1] + r]);
             let [a, b] = ends.map(|end| self.height(end));
             let up = a + part * (b - a) - ray.height;

@@ -1,7 +1,7 @@
 //! Rays towards a light, alike from all cells.
 
 use super::Shadows;
-use crate::crossing::{Crossing, is_edge};
+use crate::crossing::{Crossing, Lines, is_edge};
 
 /// Rows in front of a cell whose crossings are taken one by one.
 pub const NEAR: usize = 3;
@@ -27,7 +27,7 @@ pub struct Ray<'a> {
 impl<'a> Ray<'a> {
     pub fn new(shadows: &'a Shadows<'a>, azimuth: f64, slope: f64) -> Self {
         let field = shadows.field;
-        let [columns, rows] = field.step(azimuth);
+        let step @ [columns, rows] = field.step(azimuth);
         let is_turned = columns.abs() > rows.abs();
         let [minor, major] = if is_turned {
             [rows, columns]
@@ -40,7 +40,9 @@ impl<'a> Ray<'a> {
             true => shadows.relief / slope * (1.0 + 1e-9),
             false => f64::INFINITY,
         };
-        let crossings = Crossing::all(field, azimuth, reach);
+        let size = field.size();
+        let lines = Lines::new(step, ([0; 2], size), ([0; 2], size));
+        let crossings = lines.crossings(field.has_holes(), size[0], reach);
         let mut starts = vec![0];
         for (index, crossing) in crossings.iter().enumerate() {
             while crossing.distance >= starts.len() as f64 * length * (1.0 - 1e-9) {

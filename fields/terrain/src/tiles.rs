@@ -1,0 +1,454 @@
+//! Tiles of rasters that do not fit into memory, with the bits of the whole raster.
+//!
+//! # Windows
+//!
+//! A tile is read with a margin of one cell on each side that has neighbours: its window. All squares of four centres at which
+//! one of its cells is a corner are in it. Triangles depend on nothing but the corners of their square. So a window has each edge
+//! of the whole of which an end is in its tile, and no edge that the whole has not: two cells that look like a wire at the rim of
+//! one window are an edge in the windows of their own tiles.
+//!
+//! Where a line of sight crosses an edge depends on its offset from the eye only, heights are used as they were read, and a
+//! horizon is the largest slope. So windows raise horizons in any order, and edges that two of them share count twice without
+//! harm. A cell is lit if no window raises its horizon to the slope of the light.
+//!
+//! # Which tiles matter
+//!
+//! No crossing is higher than the higher end of its edge, and the window of the tile with this end has the edge. So a tile whose
+//! own peaks are nowhere above a horizon can be left out, whatever its neighbours are. As horizons only rise, a tile is judged
+//! once, and nearer ones go first because they mostly hide what is behind them. Of a tile only those squares are read whose peaks
+//! may matter, as rectangles with margins of their own: they are tiles, too.
+
+use std::ops::Range;
+use std::sync::atomic::AtomicBool;
+
+use crate::march::FAR;
+use crate::{Error, Eyes, HeightField, March, Monitor, Peaks, Shadows, memory, monitor::Share};
+
+/// A rectangle of cells of a raster.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tile {
+    /// Column and row of its first cell in the whole raster, which may begin anywhere.
+    pub at: [i64; 2],
+    /// Numbers of columns and rows.
+    pub size: [usize; 2],
+}
+
+impl Tile {
+    /// Columns and rows behind the last ones.
+    fn end(&self) -> [i64; 2] {
+        [0, 1].map(|axis| self.at[axis] + self.size[axis] as i64)
+    }
+
+    fn between(at: [i64; 2], end: [i64; 2]) -> Self {
+        let size = [0, 1].map(|axis| (end[axis] - at[axis]).max(0) as usize);
+        Self { at, size }
+    }
+
+    /// The part that is in another tile.
+    fn within(&self, other: &Self) -> Self {
+        let (ends, others) = (self.end(), other.end());
+        let at = [0, 1].map(|axis| self.at[axis].max(other.at[axis]));
+        Self::between(at, [0, 1].map(|axis| ends[axis].min(others[axis])))
+    }
+
+    /// The tile with its margin.
+    fn window(&self, whole: &Self) -> Self {
+        let wider = Self::between(self.at.map(|at| at - 1), self.end().map(|end| end + 1));
+        wider.within(whole)
+    }
+
+    /// Columns or rows from here to another tile, whichever are more.
+    fn gap(&self, other: &Self) -> i64 {
+        let (ends, others) = (self.end(), other.end());
+        let ways =
+            [0, 1].map(|axis| (other.at[axis] - ends[axis]).max(self.at[axis] - others[axis]));
+        ways[0].max(ways[1]).max(0)
+    }
+
+    /// Number of cells.
+    fn cells(&self) -> usize {
+        self.size[0].saturating_mul(self.size[1])
+    }
+}
+
+/// A raster in tiles, which are read when they are needed.
+pub trait Tiles {
+    /// Why a tile cannot be read.
+    type Error: From<Error>;
+
+    /// Map coordinates of corners of cells, as in [`HeightField::new`].
+    fn transform(&self) -> [f64; 6];
+
+    /// All tiles: each cell with data is in one of them, and none is beside the raster, which is the smallest rectangle around
+    /// them. Small ones, such as of 64 x 64 cells, need fewer cells in all, because what is near is known before what is far.
+    fn tiles(&self) -> &[Tile];
+
+    /// Largest height of the cells of a tile, or more than that; minus infinity without data. It is needed for
+    /// every tile, so that it should be known without reading.
+    fn peak(&self, tile: usize) -> f64;
+
+    /// Peaks of the squares of a tile, as of a field with just its cells, if they are known. Just the squares that may matter are
+    /// read.
+    fn peaks(&self, tile: usize) -> Result<Option<Peaks>, Self::Error> {
+        let _ = tile;
+        Ok(None)
+    }
+
+    /// Heights of all cells of a rectangle, row by row; NaN where there is no data. It is a tile or squares of one, and a cell
+    /// more on each side that is not a border of the raster.
+    fn read(&self, part: Tile) -> Result<Vec<f64>, Self::Error>;
+}
+
+/// Answers for a tile of a raster, with the bits that the whole raster would give. It reads other tiles only if they may matter.
+///
+/// ```
+/// use antumbra_terrain::{Error, Pull, Tile, Tiles, degrees};
+///
+/// /// A plain with a wall in column 7, in two tiles.
+/// struct Plain([Tile; 2]);
+///
+/// impl Tiles for Plain {
+///     type Error = Error;
+///
+///     fn transform(&self) -> [f64; 6] {
+///         [0.0, 1.0, 0.0, 0.0, 0.0, -1.0]
+///     }
+///
+///     fn tiles(&self) -> &[Tile] {
+///         &self.0
+///     }
+///
+///     fn peak(&self, tile: usize) -> f64 {
+///         [0.0, 2.0][tile]
+///     }
+///
+///     fn read(&self, part: Tile) -> Result<Vec<f64>, Error> {
+///         let [columns, rows] = part.size;
+///         let height = |cell: usize| if part.at[0] + (cell % columns) as i64 == 7 { 2.0 } else { 0.0 };
+///         Ok((0..columns * rows).map(height).collect())
+///     }
+/// }
+///
+/// let plain = Plain([0, 4].map(|column| Tile { at: [column, 0], size: [4, 3] }));
+/// let pull = Pull { tiles: &plain, rise: 0.0 };
+/// let east = pull.horizons(&plain.0[0], &[90.0], 0.0, &())?;
+/// assert_eq!(degrees(east.values[0][3]), 26.565052, "2 in 4 cells");
+/// assert_eq!(east.read, [1]);
+/// // A sun 72 degrees high is above the peak of the other tile, wherever in it that is.
+/// let lit = pull.lit(&plain.0[0], &[[90.0, 3.0]], &())?;
+/// assert_eq!((lit.values, lit.read), (vec![vec![0b1111; 3]], vec![]));
+/// # Ok::<(), Error>(())
+/// ```
+#[derive(Clone, Copy, Debug)]
+pub struct Pull<'a, T> {
+    /// The raster.
+    pub tiles: &'a T,
+    /// Height of eyes above their cells. Below 0 they see nothing.
+    pub rise: f64,
+}
+
+/// Answers for a tile, and what was read for them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pulled<V> {
+    /// The values in each direction.
+    pub values: Vec<Vec<V>>,
+    /// Numbers of the tiles of which something was read besides the own one, in this order.
+    pub read: Vec<usize>,
+    /// Cells that were read of these tiles, with margins.
+    pub cells: u64,
+}
+
+/// A direction, and the slopes of horizons in it so far.
+struct Way {
+    azimuth: f64,
+    slopes: Vec<f64>,
+}
+
+impl<T: Tiles> Pull<'_, T> {
+    /// Slopes of the horizons of all cells of a tile, one of the raster or any other rectangle of it, row by row for each azimuth
+    /// in degrees. They are as of [`March::horizons`], with NaN for cells without data.
+    ///
+    /// The memory is 8 bytes for each cell and azimuth, and two tiles. With many azimuths at once, tiles are read fewer times.
+    ///
+    /// # Errors
+    /// [`Error::Range`] if an azimuth is not finite, the tile is not in the raster, or the raster has more than 2^28 columns or
+    /// rows; [`Error::NoMemory`], [`Error::Cancelled`]; and whatever reading fails with.
+    pub fn horizons(
+        &self,
+        tile: &Tile,
+        azimuths: &[f64],
+        drop: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<Pulled<f64>, T::Error> {
+        let own = Own::new(self.tiles, tile)?;
+        let field = own.field(self.tiles)?;
+        let march = March::new(&field, self.rise, drop)?;
+        let mut ways = Vec::new();
+        for (index, &azimuth) in azimuths.iter().enumerate() {
+            let mut slopes = memory::room("slopes", own.heights.len())?;
+            let start = |height: &f64| match height.is_nan() {
+                true => f64::NAN,
+                false => f64::NEG_INFINITY,
+            };
+            slopes.extend(own.heights.iter().map(start));
+            let share = Share(&Share(monitor, [0, 2]), [index, azimuths.len()]);
+            march.raise(&own.eyes(&own.window), azimuth, &mut slopes, &share)?;
+            ways.push(Way { azimuth, slopes });
+        }
+        let (read, cells) = self.raise(&own, &mut ways, drop, &Share(monitor, [1, 2]))?;
+        let values = ways.into_iter().map(|way| way.slopes).collect();
+        Ok(Pulled {
+            values,
+            read,
+            cells,
+        })
+    }
+
+    /// Which cells of a tile, one of the raster or any other rectangle of it, get light from each direction: an azimuth in
+    /// degrees and the tangent of an elevation. There is a bit for each cell, as of [`Shadows::lit`].
+    ///
+    /// The memory is 8 bytes for each cell and direction, and two tiles. With many directions at once, tiles are read fewer
+    /// times.
+    ///
+    /// # Errors
+    /// As of [`Pull::horizons`] and [`Shadows::lit`].
+    pub fn lit(
+        &self,
+        tile: &Tile,
+        directions: &[[f64; 2]],
+        monitor: &dyn Monitor,
+    ) -> Result<Pulled<u64>, T::Error> {
+        let own = Own::new(self.tiles, tile)?;
+        let field = own.field(self.tiles)?;
+        let planes =
+            Shadows::new(&field, self.rise)?.all_lit(directions, &Share(monitor, [0, 2]))?;
+        let [width, _] = tile.size;
+        let [column, row] = [0, 1].map(|axis| (tile.at[axis] - own.window.at[axis]) as usize);
+        let words = field.size()[0].div_ceil(64);
+        let mut ways = Vec::new();
+        for (&[azimuth, slope], plane) in directions.iter().zip(&planes) {
+            // A horizon just below the light; none is above infinity.
+            let start = slope.clamp(-STEEP, STEEP).next_down();
+            let mut slopes = memory::room("slopes", own.heights.len())?;
+            slopes.extend((0..own.heights.len()).map(|cell| {
+                let [column, row] = [column + cell % width, row + cell / width];
+                match plane[row * words + column / 64] >> (column % 64) & 1 {
+                    1 => start,
+                    _ => f64::INFINITY,
+                }
+            }));
+            ways.push(Way { azimuth, slopes });
+        }
+        let (read, cells) = self.raise(&own, &mut ways, 0.0, &Share(monitor, [1, 2]))?;
+        let mut values = Vec::new();
+        for (Way { slopes, .. }, &[_, slope]) in ways.iter().zip(directions) {
+            let slope = slope.clamp(-STEEP, STEEP);
+            let words = width.div_ceil(64);
+            let mut plane = memory::filled("words", words * tile.size[1], 0)?;
+            for (cell, &own) in slopes.iter().enumerate() {
+                let [column, row] = [cell % width, cell / width];
+                plane[row * words + column / 64] |= u64::from(own < slope) << (column % 64);
+            }
+            values.push(plane);
+        }
+        Ok(Pulled {
+            values,
+            read,
+            cells,
+        })
+    }
+
+    /// Raises slopes to the horizons that tiles around give, nearest ones first. Returns which tiles were read, and how many
+    /// cells.
+    fn raise(
+        &self,
+        own: &Own,
+        ways: &mut [Way],
+        drop: f64,
+        monitor: &dyn Monitor,
+    ) -> Result<(Vec<usize>, u64), T::Error> {
+        let all = self.tiles.tiles();
+        let least = |numbers: &[f64]| numbers.iter().copied().fold(f64::INFINITY, f64::min);
+        let lowest = least(&own.heights) + self.rise;
+        let mut horizons: Vec<f64> = ways.iter().map(|way| least(&way.slopes)).collect();
+        let field = own.field(self.tiles)?;
+        let steps: Vec<[f64; 2]> = ways.iter().map(|way| field.step(way.azimuth)).collect();
+        let mut order: Vec<usize> = (0..all.len()).collect();
+        // Windows of tiles in the own one have nothing more.
+        order.retain(|&tile| all[tile].within(&own.tile) != all[tile]);
+        order.sort_by_key(|&tile| own.tile.gap(&all[tile]));
+        let (mut read, mut cells) = (Vec::new(), 0);
+        for (index, &tile) in order.iter().enumerate() {
+            let share = Share(monitor, [index, order.len()]);
+            share.progress(0, 1);
+            let (eyes, peak) = (own.eyes(&all[tile]), self.tiles.peak(tile));
+            let window = all[tile].window(&own.whole);
+            let first = [0, 1].map(|axis| (window.at[axis] - all[tile].at[axis]) as isize);
+            let lines = steps
+                .iter()
+                .map(|&step| eyes.lines(step, (first, window.size)));
+            let lines: Vec<_> = lines.collect();
+            let matters = |way: usize| lines[way].most(peak - lowest, drop) > horizons[way];
+            let needed: Vec<usize> = (0..ways.len()).filter(|&way| matters(way)).collect();
+            if needed.is_empty() {
+                if monitor.cancelled() {
+                    return Err(Error::Cancelled.into());
+                }
+                continue;
+            }
+            let side = all[tile].size[0].max(all[tile].size[1]).next_power_of_two();
+            let peaks = match self.tiles.peaks(tile)? {
+                Some(peaks) => peaks,
+                None => Peaks::from_values(all[tile].size, side, &[peak])?,
+            };
+            let (size, side) = (peaks.size(), peaks.side());
+            let wanted = all[tile].size.map(|cells| cells.div_ceil(side));
+            Error::check_length("columns of peaks of a tile", size[0], wanted[0])?;
+            Error::check_length("rows of peaks of a tile", size[1], wanted[1])?;
+            let mut marks = memory::room("marks", size[0] * size[1])?;
+            marks.resize_with(size[0] * size[1], AtomicBool::default);
+            let levels = peaks.levels()?;
+            for &way in &needed {
+                let slopes = &mut ways[way].slopes;
+                eyes.mark(
+                    (&levels, &marks),
+                    &lines[way],
+                    [self.rise, drop],
+                    slopes,
+                    &share,
+                )?;
+            }
+            let marks: Vec<bool> = marks.into_iter().map(AtomicBool::into_inner).collect();
+            let parts = rectangles(&marks, size[0]);
+            for [columns, rows] in &parts {
+                let place = |axis: usize, at: usize| all[tile].at[axis] + (at * side) as i64;
+                let at = [place(0, columns.start), place(1, rows.start)];
+                let part = Tile::between(at, [place(0, columns.end), place(1, rows.end)]);
+                let window = part.within(&all[tile]).window(&own.whole);
+                let heights = self.tiles.read(window)?;
+                let field = HeightField::new(window.size, &heights, self.tiles.transform())?;
+                let march = March::new(&field, self.rise, drop)?;
+                let eyes = own.eyes(&window);
+                let peak = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+                for &way in &needed {
+                    let lines = eyes.lines(steps[way], ([0; 2], window.size));
+                    if lines.most(peak - lowest, drop) > horizons[way] {
+                        let Way { azimuth, slopes } = &mut ways[way];
+                        march.raise(&eyes, *azimuth, slopes, &share)?;
+                    }
+                }
+                cells += window.cells() as u64;
+            }
+            for way in needed {
+                horizons[way] = least(&ways[way].slopes);
+            }
+            if !parts.is_empty() {
+                read.push(tile);
+            }
+        }
+        monitor.progress(1, 1);
+        Ok((read, cells))
+    }
+}
+
+/// Rectangles of columns and rows that have just the squares with a mark.
+fn rectangles(marks: &[bool], columns: usize) -> Vec<[Range<usize>; 2]> {
+    let mut found: Vec<[Range<usize>; 2]> = Vec::new();
+    for (row, marks) in marks.chunks(columns).enumerate() {
+        let mut end = 0;
+        for run in marks.chunk_by(|a, b| a == b) {
+            let own = end..end + run.len();
+            end = own.end;
+            if !run[0] {
+                continue;
+            }
+            let above = found
+                .iter_mut()
+                .find(|[columns, rows]| *columns == own && rows.end == row);
+            match above {
+                Some([_, rows]) => rows.end += 1,
+                None => found.push([own, row..row + 1]),
+            }
+        }
+    }
+    found
+}
+
+/// A slope that is as good as infinite, as of [`Shadows`].
+const STEEP: f64 = 1e20;
+
+/// The own tile.
+struct Own {
+    whole: Tile,
+    tile: Tile,
+    heights: Vec<f64>,
+    window: Tile,
+    around: Vec<f64>,
+}
+
+impl Own {
+    /// Reads the tile.
+    fn new<T: Tiles>(tiles: &T, tile: &Tile) -> Result<Self, T::Error> {
+        /// Most columns and rows before a tile.
+        const MOST: u64 = 1 << 40;
+        let all = tiles.tiles();
+        for Tile { at, size } in all.iter().chain([tile]) {
+            let is_in = |axis: usize| {
+                at[axis].unsigned_abs() <= MOST && (1..=FAR).contains(&(size[axis] as u64))
+            };
+            let wanted = "columns and rows up to 2^40, and from 1 to 2^28 of them";
+            Error::check_range(
+                "place of a tile",
+                at[0] as f64,
+                is_in(0) && is_in(1),
+                wanted,
+            )?;
+        }
+        let least = |axis: usize| all.iter().map(|tile| tile.at[axis]).min().unwrap_or(0);
+        let most = |axis: usize| all.iter().map(|tile| tile.end()[axis]).max().unwrap_or(0);
+        let whole = Tile::between([0, 1].map(least), [0, 1].map(most));
+        let size = whole.size[0].max(whole.size[1]);
+        let is_in = size as u64 <= FAR;
+        Error::check_range("columns or rows", size as f64, is_in, "at most 2^28")?;
+        let is_in = tile.within(&whole) == *tile;
+        Error::check_range(
+            "column of a tile",
+            tile.at[0] as f64,
+            is_in,
+            "a tile in the raster",
+        )?;
+        let window = tile.window(&whole);
+        let around = tiles.read(window)?;
+        Error::check_length("heights", around.len(), window.cells())?;
+        let mut heights = memory::room("heights", tile.cells())?;
+        let [column, row] = [0, 1].map(|axis| (tile.at[axis] - window.at[axis]) as usize);
+        for row in around
+            .chunks(window.size[0].max(1))
+            .skip(row)
+            .take(tile.size[1])
+        {
+            heights.extend_from_slice(&row[column..][..tile.size[0]]);
+        }
+        Ok(Self {
+            whole,
+            tile: *tile,
+            heights,
+            window,
+            around,
+        })
+    }
+
+    /// The window.
+    fn field<T: Tiles>(&self, tiles: &T) -> Result<HeightField<'_>, Error> {
+        HeightField::new(self.window.size, &self.around, tiles.transform())
+    }
+
+    /// Eyes at all cells, seen from another tile.
+    fn eyes(&self, other: &Tile) -> Eyes<'_> {
+        Eyes {
+            heights: &self.heights,
+            width: self.tile.size[0],
+            at: [0, 1].map(|axis| self.tile.at[axis] - other.at[axis]),
+        }
+    }
+}
