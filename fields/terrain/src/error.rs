@@ -34,6 +34,12 @@ pub enum Error {
         /// Bytes of all items.
         bytes: u128,
     },
+    /// A [`Border`](crate::Border) is damaged, or of another sweep.
+    #[error("border of a tile: wanted {wanted}")]
+    Border {
+        /// What should be there.
+        wanted: &'static str,
+    },
     /// The [monitor](crate::Monitor) cancelled the work.
     #[error("cancelled")]
     Cancelled,

@@ -5,6 +5,7 @@
 //! | question | call | answer |
 //! |---|---|---|
 //! | how high is the horizon of each cell along a step between cells | [`Sweep::horizons`] | a number for each cell |
+//! | the same for a tile of a larger raster, whose hulls go on to others | [`TileSweep::horizons`] | a number for each cell, a [`Border`] |
 //! | the same in any other azimuth | [`March::horizons`] | a number for each cell |
 //! | which azimuths have such steps, and how much of the circle is each | [`Lattice`] | steps, degrees, weights |
 //! | how much of the sky does each cell see | [`FieldSky`] | a number for each cell |
@@ -71,6 +72,6 @@ pub use monitor::{Progress, Share};
 pub use shadows::{Shadows, per_cell};
 pub use sky::{FieldSky, SkyMeasure, SkyValues};
 pub use skyline::{Light, Skyline};
-pub use sweep::Sweep;
+pub use sweep::{Border, Sweep, TileSweep};
 pub use tiles::{Pull, Pulled, Tile, Tiles};
 pub use viewshed::{Limits, Viewer};

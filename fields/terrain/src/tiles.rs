@@ -36,16 +36,19 @@ pub struct Tile {
 impl Tile {
     /// Columns and rows behind the last ones.
     fn end(&self) -> [i64; 2] {
-        [0, 1].map(|axis| self.at[axis] + self.size[axis] as i64)
+        let size = self
+            .size
+            .map(|cells| i64::try_from(cells).unwrap_or(i64::MAX));
+        [0, 1].map(|axis| self.at[axis].saturating_add(size[axis]))
     }
 
     fn between(at: [i64; 2], end: [i64; 2]) -> Self {
-        let size = [0, 1].map(|axis| (end[axis] - at[axis]).max(0) as usize);
+        let size = [0, 1].map(|axis| end[axis].saturating_sub(at[axis]).max(0) as usize);
         Self { at, size }
     }
 
     /// The part that is in another tile.
-    fn within(&self, other: &Self) -> Self {
+    pub(crate) fn within(&self, other: &Self) -> Self {
         let (ends, others) = (self.end(), other.end());
         let at = [0, 1].map(|axis| self.at[axis].max(other.at[axis]));
         Self::between(at, [0, 1].map(|axis| ends[axis].min(others[axis])))
@@ -66,7 +69,7 @@ impl Tile {
     }
 
     /// Number of cells.
-    fn cells(&self) -> usize {
+    pub(crate) fn cells(&self) -> usize {
         self.size[0].saturating_mul(self.size[1])
     }
 }

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use super::border::Line;
+
 /// Lines that are walked side by side: reading long runs of each row keeps the memory busy.
 pub const LINES: usize = 256;
 
@@ -72,21 +74,52 @@ impl Hulls {
             prior: none,
             calls: 0,
         };
-        hulls.clear(0..LINES);
+        (0..LINES).for_each(|line| hulls.begin(line));
         hulls
     }
 
-    /// Begins some lines.
-    pub fn clear(&mut self, lines: Range<usize>) {
-        for line in lines {
-            for (depth, height) in [f64::NAN, f64::NEG_INFINITY].into_iter().enumerate() {
-                self.points[depth * LINES + line] = [BEGIN, height];
-            }
-            self.depths[line] = 2;
-            [self.before[0][line], self.before[1][line]] = [BEGIN, f64::NAN];
-            [self.last[0][line], self.last[1][line]] = [BEGIN, f64::NEG_INFINITY];
-            self.held.heights[line] = f64::NAN;
-            self.prior.heights[line] = f64::NAN;
+    /// Begins a line.
+    pub fn begin(&mut self, line: usize) {
+        for (depth, height) in [f64::NAN, f64::NEG_INFINITY].into_iter().enumerate() {
+            self.points[depth * LINES + line] = [BEGIN, height];
+        }
+        self.depths[line] = 2;
+        [self.before[0][line], self.before[1][line]] = [BEGIN, f64::NAN];
+        [self.last[0][line], self.last[1][line]] = [BEGIN, f64::NEG_INFINITY];
+        self.held.heights[line] = f64::NAN;
+        self.prior.heights[line] = f64::NAN;
+    }
+
+    /// Goes on with a line that came from another tile. The points that all lines passed last are at these distances.
+    pub fn enter(&mut self, line: usize, [held, prior]: [f64; 2], from: &Line) {
+        self.begin(line);
+        (self.held.at, self.held.heights[line]) = (held, from.held);
+        (self.prior.at, self.prior.heights[line]) = (prior, from.prior);
+        let depth = from.points.len() + 2;
+        let room = self.points.len().max(depth * LINES);
+        self.points.resize(room, [0.0; 2]);
+        for (index, [apart, height]) in from.points.iter().enumerate() {
+            self.points[(index + 2) * LINES + line] = [held - apart, *height];
+        }
+        self.depths[line] = depth;
+        let [last, before] = [1, 2].map(|back| self.points[(depth - back) * LINES + line]);
+        [self.last[0][line], self.last[1][line]] = last;
+        [self.before[0][line], self.before[1][line]] = before;
+        // There may be no room for more.
+        self.calls = 0;
+    }
+
+    /// What a line needs to go on in another tile behind the cell that was passed last.
+    pub fn leave(&self, line: usize, place: [i64; 2]) -> Line {
+        let points = (2..self.depths[line]).map(|depth| {
+            let [at, height] = self.points[depth * LINES + line];
+            [self.held.at - at, height]
+        });
+        Line {
+            place,
+            held: self.held.heights[line],
+            prior: self.prior.heights[line],
+            points: points.collect(),
         }
     }
 

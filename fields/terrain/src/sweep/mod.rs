@@ -21,18 +21,34 @@
 //!
 //! Over a round earth places lose height with the squared distance from the observer. As each observer compares points by differences
 //! of distances only, the same hull serves: see `hides` in `hulls`.
+//!
+//! # Tiles
+//!
+//! A line passes its cells and crossings in one order, and all that earlier ones leave behind is its hull. So a raster can be swept tile
+//! by tile, with the same operations and hence the same bits, if a line enters a tile with the hull with which it left the last one. A
+//! line is between tiles where a step leads from a cell of one to a cell of another, and is named by the former: so tiles agree on
+//! lines whatever their sizes are. Four facts make that exact:
+//!
+//! - Points are compared by differences of distances only. These are whole numbers below 2^53, so that it does not matter from where
+//!   distances count: here from the first station of a tile, and in a border from the cell.
+//! - Beside the hull, a line keeps the last two points it passed: the cell, and the last crossing before it, or the cell before. Their
+//!   distances follow from the step, and their heights are in the border.
+//! - Ends of an edge that is crossed on the way of a step are in the rectangle between both cells. Lines cross edges along rows or
+//!   columns inside of it only, so that it has the other corners of their triangles, too; a diagonal's are in its square. Whether a
+//!   cell is the corner of a triangle, and each edge there, is decided by the eight around it. So a margin as wide as the step and
+//!   at least 1 answers all questions as the whole does, and says whether there is a cell one step ahead or behind.
+//! - What depends on all of the raster is given: its size, and whether it has holes, which adds crossings to all lines.
 
+mod border;
 mod crossing;
 mod hulls;
 mod lines;
+mod tile;
 
-use std::sync::atomic::AtomicU32;
+pub use border::Border;
+pub use tile::TileSweep;
 
-use antumbra_simd::Isa;
-
-use crate::lattice::divisor;
-use crate::{Error, HeightField, Monitor, memory};
-use lines::Lines;
+use crate::{Error, HeightField, Monitor, Tile};
 
 /// Horizons of all cells of a height field, one azimuth at a time.
 #[derive(Clone, Copy, Debug)]
@@ -73,17 +89,15 @@ impl Sweep<'_> {
         of: impl Fn(f64) -> f32 + Sync,
         monitor: &dyn Monitor,
     ) -> Result<Vec<f32>, Error> {
-        let [q, p] = step;
-        let wanted = "steps without a common divisor";
-        let is_step = divisor(q, p) == 1;
-        Error::check_range("step in columns and rows", q.into(), is_step, wanted)?;
-        let cells = self.field.heights().len();
-        let mut found = memory::room("horizons", cells)?;
-        found.resize_with(cells, || AtomicU32::new(f32::NAN.to_bits()));
-        Lines::new(self, step).walk(Isa::best(), &of, &found, monitor)?;
-        let values = found.into_iter();
-        Ok(values
-            .map(|bits| f32::from_bits(bits.into_inner()))
-            .collect())
+        // One tile, which no line enters or leaves.
+        let whole = self.field.size().map(|size| size as i64);
+        let whole = TileSweep {
+            sweep: *self,
+            at: [0; 2],
+            tile: Tile::whole(whole),
+            whole,
+            has_holes: self.field.has_holes(),
+        };
+        Ok(whole.horizons(step, &[], of, monitor)?.0)
     }
 }
