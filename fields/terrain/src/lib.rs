@@ -40,7 +40,7 @@
 //! - `height_field`: heights as a surface of triangles;  `lattice`: steps and their azimuths
 //! - `sweep`, `march`: horizons;  `sky`: sums over them;  `shadows`, `skyline`: light from far away;  `viewshed`: viewsheds
 //! - `tiles`: parts of larger rasters
-//! - `crossing`: crossings of lines of sight with edges
+//! - `crossing`: crossings of lines of sight with edges;  `peaks`: largest heights of squares
 //! - `angles`: degrees;  `monitor`: progress and cancellation;  `memory`: lists that may not fit;  `error`: why there is no result
 #![forbid(unsafe_code)]
 
@@ -54,6 +54,7 @@ mod march;
 #[doc(hidden)]
 pub mod memory;
 mod monitor;
+mod peaks;
 mod shadows;
 mod sky;
 mod skyline;
@@ -65,10 +66,11 @@ pub use angles::degrees;
 pub use error::Error;
 pub use height_field::{HeightField, Observer};
 pub use lattice::{Direction, Lattice, weights};
-pub use march::{Eyes, March, Peaks};
+pub use march::{Eyes, March};
 pub use monitor::Monitor;
 #[doc(hidden)]
 pub use monitor::{Progress, Share};
+pub use peaks::Peaks;
 pub use shadows::{Shadows, per_cell};
 pub use sky::{FieldSky, SkyMeasure, SkyValues};
 pub use skyline::{Light, Skyline};

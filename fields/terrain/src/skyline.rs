@@ -11,7 +11,7 @@
 
 use crate::crossing::{CLOSE, edge_at, floor, is_edge, is_twice};
 use crate::height_field::{Family, families};
-use crate::march::{Peaks, SIDES};
+use crate::peaks::{Peaks, SIDES};
 use crate::{Error, HeightField, Observer, angles::check_azimuths};
 
 /// Cells beyond the ends of a stretch in which crossings are looked for.

@@ -136,7 +136,7 @@ impl<'a, J: Job> Work<'a, J> {
         ]
     }
 
-    /// Computes the next chunk; false if the share is complete. `monitor` counts the items of the share.
+    /// Computes the next chunk; false if the share is complete. `monitor` sees which part of the share is done.
     ///
     /// # Errors
     /// [`Error`] if the job makes no sense, or if `monitor` cancels: nothing is known then of this chunk.
@@ -146,12 +146,14 @@ impl<'a, J: Job> Work<'a, J> {
             return Ok(false);
         };
         let [before, total] = self.progress();
+        let items = self.range(next);
         let monitor = OfShare {
             monitor,
             before,
+            items: items.len(),
             total,
         };
-        let answers = self.job.answers(bvh, self.range(next), &monitor)?;
+        let answers = self.job.answers(bvh, items, &monitor)?;
         self.chunks[next].answers = Some(bytes_of(&answers)?);
         Ok(true)
     }
@@ -218,12 +220,19 @@ impl<'a, J: Job> Work<'a, J> {
 struct OfShare<'a> {
     monitor: &'a dyn Monitor,
     before: usize,
+    /// Items of the chunk, whatever the job counts.
+    items: usize,
     total: usize,
 }
 
+/// Parts of an item that are told apart.
+const PARTS: usize = 1000;
+
 impl Monitor for OfShare<'_> {
-    fn progress(&self, done: usize, _: usize) {
-        self.monitor.progress(self.before + done, self.total);
+    fn progress(&self, done: usize, of: usize) {
+        let own = PARTS * self.items * done / of.max(1);
+        self.monitor
+            .progress(PARTS * self.before + own, PARTS * self.total);
     }
 
     fn cancelled(&self) -> bool {

@@ -100,8 +100,9 @@ impl Job for FieldHorizonJob<'_> {
 
     fn answers(&self, _: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers<Self> {
         let mut all = Vec::new();
+        let (first, count) = (items.start, items.len());
         for index in items {
-            let plane = self.plane(index, monitor)?;
+            let plane = self.plane(index, &Share(monitor, [index - first, count]))?;
             crate::memory::grow(&mut all, "horizons", plane.len())?;
             all.extend(plane);
         }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use antumbra::Bvh;
-use antumbra_terrain::{HeightField, Limits, Observer, Viewer, memory};
+use antumbra_terrain::{HeightField, Limits, Observer, Share, Viewer, memory};
 
 use crate::jobs::job::in_pieces;
 use crate::{Answers, BitMatrix, Error, Job, Key, Monitor, Numbers, Size};
@@ -146,8 +146,9 @@ impl Job for TargetHeightJob<'_> {
 
     fn answers(&self, _: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers<Self> {
         let mut all = Vec::new();
-        for group in self.groups().skip(items.start).take(items.len()) {
-            let heights = self.of(group, monitor)?;
+        let groups = self.groups().skip(items.start).take(items.len());
+        for (index, group) in groups.enumerate() {
+            let heights = self.of(group, &Share(monitor, [index, items.len()]))?;
             memory::grow(&mut all, "heights", heights.len())?;
             all.extend(heights);
         }

@@ -1,9 +1,11 @@
 //! Viewsheds of height fields against all triangles in double precision, and against the horizon of a sphere.
 
+use std::sync::Mutex;
+
 use antumbra::{Bvh, Recipe};
 use antumbra_bake::{
-    EARTH_RADIUS, HeightField, Job, Key, Limits, Observer, Part, REFRACTION, TargetHeightJob,
-    ViewshedJob, Viewsheds, Work, run,
+    Direction, EARTH_RADIUS, FieldHorizonJob, HeightField, Job, Key, Limits, Monitor, Observer,
+    Part, REFRACTION, TargetHeightJob, ViewshedJob, Viewsheds, Work, run,
 };
 use antumbra_raster::{Grid, Raster};
 use antumbra_terrain::Error;
@@ -12,13 +14,27 @@ fn tree() -> Bvh {
     Bvh::build(&[], &Recipe::default()).expect("a tree")
 }
 
+/// How far work is: never farther than all of it.
+struct Done(Mutex<[usize; 2]>);
+
+impl Monitor for Done {
+    fn progress(&self, done: usize, total: usize) {
+        assert!(done <= total, "{done} of {total}");
+        let mut last = self.0.lock().expect("no panic");
+        *last = [done.max(last[0]), total];
+    }
+}
+
 /// What so many shares of a job find together.
 pub fn in_shares<J: Job>(job: &J, bvh: &Bvh, shares: u32) -> J::Found {
     let key = Key::of(job, |_| {});
     let mut together = Work::new(job, key, [0, 1], Vec::new());
     for index in 0..shares {
         let mut work = Work::new(job, key, [index, shares], Vec::new());
-        while work.step(bvh, &()).expect("a step") {}
+        let done = Done(Mutex::default());
+        while work.step(bvh, &done).expect("a step") {}
+        let [done, total] = *done.0.lock().expect("no panic");
+        assert_eq!(done, total);
         let mut file = Vec::new();
         work.write(&mut file).expect("bytes");
         let part = Part::read(&file).expect("a part");
@@ -483,4 +499,20 @@ fn what_is_no_field_is_refused() {
         let field = HeightField::new(size, &heights, PLAIN).expect("a field");
         assert_eq!(field.surface([0.0; 2]), None, "{size:?}");
     }
+}
+
+#[test]
+fn shares_of_horizons_are_all_horizons() {
+    let raster = hills([300, 200], [0.0, 2.0, 0.0, 0.0, 0.0, -2.0], 0.01, 3);
+    let field = HeightField::new([300, 200], &raster.values, raster.grid.transform);
+    let field = field.expect("a field");
+    let directions = [
+        Direction::Step([2, 1]),
+        Direction::Azimuth(17.0),
+        Direction::Azimuth(200.0),
+    ];
+    let job = FieldHorizonJob::new(&field, &directions, 0.0, 0.0).expect("a job");
+    let bits = |angles: Vec<f32>| angles.into_iter().map(f32::to_bits).collect::<Vec<_>>();
+    let whole = run(&job, &tree(), &()).expect("angles");
+    assert_eq!(bits(in_shares(&job, &tree(), 2)), bits(whole));
 }

@@ -184,8 +184,7 @@ impl Progress {
 
     /// Notes how far a phase is.
     fn note(&self, doing: &'static str, phase: Phase, done: u64, total: u64) {
-        // Sweeps may count a line more than they announced.
-        let share = (done as f64 / total.max(1) as f64).min(1.0);
+        let share = done as f64 / total.max(1) as f64;
         let mut work = lock(&self.state.work);
         if work.phase != Some(phase) {
             work.phase = Some(phase);

@@ -108,12 +108,11 @@ pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), 
 
 /// Numbers of observers that see each cell with data.
 fn counts(found: &Viewsheds, heights: &[f64]) -> Vec<f32> {
-    let none = |height: &f64| if height.is_nan() { f32::NAN } else { 0.0 };
-    let mut counts: Vec<f32> = heights.iter().map(none).collect();
-    for run in (0..found.observers()).flat_map(|observer| found.seen(observer)) {
-        counts[run].iter_mut().for_each(|count| *count += 1.0);
-    }
-    counts
+    let known = |(count, height): (u32, &f64)| match height.is_nan() {
+        true => f32::NAN,
+        false => count as f32,
+    };
+    found.counts().into_iter().zip(heights).map(known).collect()
 }
 
 /// Heights from which cells are seen: at once, or by shares, which take more memory.
