@@ -225,7 +225,7 @@ struct OfShare<'a> {
     total: usize,
 }
 
-/// Parts of an item that are told apart.
+/// Parts of an item that progress distinguishes.
 const PARTS: usize = 1000;
 
 impl Monitor for OfShare<'_> {
