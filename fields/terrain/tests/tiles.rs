@@ -245,7 +245,8 @@ fn tiles_have_the_horizons_and_the_light_of_the_whole() {
             .iter()
             .map(|azimuth| [*azimuth, slope(azimuth)])
             .collect();
-        suns.extend([[9.0, f64::INFINITY], [9.0, f64::NEG_INFINITY]]);
+        // From below, and where nothing is.
+        suns.extend([[9.0, -0.3], [9.0, f64::INFINITY], [9.0, f64::NEG_INFINITY]]);
         let wholes: Vec<Vec<u64>> = azimuths
             .iter()
             .map(|&azimuth| bits(&march, azimuth))
@@ -420,4 +421,88 @@ fn what_is_wrong_is_refused() {
     assert_eq!(raise(eyes(3, [0, -1 << 28]), 6), Ok(()));
     assert!(is_range(raise(eyes(3, [0, 1 << 29]), 6)) && is_range(raise(eyes(0, [0; 2]), 6)));
     assert!(raise(eyes(4, [0; 2]), 6).is_err() && raise(eyes(3, [0; 2]), 5).is_err());
+}
+
+#[test]
+fn light_and_horizons_come_from_tiles_far_away() {
+    let mut random = Rng::new(54);
+    let mut far = 0;
+    for round in 0..12 {
+        let size = [0, 1].map(|_| 300 + (f64::from(random.unit()) * 200.0) as usize);
+        let holes = [0.0, 0.0, 0.002][round % 3];
+        let mut raster = Raster::new(&mut random, size, holes, TRANSFORMS[round % 4]);
+        let unit = [64, 100, 128][round / 4];
+        let [columns, rows] = size.map(|size| (0..size).step_by(unit));
+        let tiles = rows.flat_map(|row| columns.clone().map(move |column| [column, row]));
+        let tiles = tiles.map(|at| Tile {
+            at: [0, 1].map(|axis| raster.at[axis] + at[axis] as i64),
+            size: [0, 1].map(|axis| unit.min(size[axis] - at[axis])),
+        });
+        raster.tiles = tiles.collect();
+        raster.side = [None, Some(8), Some(1), Some(32)][round % 4];
+        // A plain with some ranges of hills, of which a cell may see what is far away.
+        let lowest = raster.heights.iter().copied().fold(f64::NAN, f64::min);
+        for (cell, height) in raster.heights.iter_mut().enumerate() {
+            let [column, row] = [cell % size[0], cell / size[0]];
+            if (column + 2 * row) % 211 > 9 && (3 * column + row) % 173 > 4 {
+                *height = lowest + 0.05 * (*height - lowest);
+            }
+        }
+        let field = raster.field();
+        let rise = if round % 2 == 0 { 2.0 } else { 0.0 };
+        let pull = Pull {
+            tiles: &raster,
+            rise,
+        };
+        let azimuths: Vec<f64> = (0..3)
+            .map(|index| azimuth(&mut random, &field, index + round))
+            .collect();
+        let relief = raster.heights.iter().copied().fold(lowest, f64::max) - lowest;
+        let long = field.unit() * size[0] as f64;
+        let suns = [0.05, 0.3, 1.0, 3.0].map(|part| {
+            let azimuth = azimuth(&mut random, &field, round);
+            [azimuth, part * relief / long]
+        });
+        let march = March::new(&field, rise, 0.0).expect("a march");
+        let wholes: Vec<Vec<u64>> = azimuths
+            .iter()
+            .map(|&azimuth| bits(&march, azimuth))
+            .collect();
+        let shadows = Shadows::new(&field, rise).expect("shadows");
+        let lit = shadows.all_lit(&suns, &()).expect("light");
+        for index in 0..2 {
+            let count = raster.tiles.len() as f64;
+            let own = raster.tiles[(f64::from(random.unit()) * count) as usize];
+            let about = format!("{round} {index} {size:?} {own:?} {azimuths:?} {suns:?}");
+            let found = pull.lit(&own, &suns, &()).expect("light");
+            for (found, lit) in found.values.iter().zip(&lit) {
+                let bit = |plane: &[u64], width: usize, [column, row]: [usize; 2]| {
+                    plane[row * width.div_ceil(64) + column / 64] >> (column % 64) & 1
+                };
+                for cell in 0..own.size[0] * own.size[1] {
+                    let at = [cell % own.size[0], cell / own.size[0]];
+                    let place =
+                        [0, 1].map(|axis| at[axis] + (own.at[axis] - raster.at[axis]) as usize);
+                    let wanted = bit(lit, size[0], place);
+                    assert_eq!(bit(found, own.size[0], at), wanted, "{about} {at:?}");
+                }
+            }
+            let beside = |tile: &usize| {
+                let tile = raster.tiles[*tile];
+                (0..2).all(|axis| (tile.at[axis] - own.at[axis]).abs() <= unit as i64)
+            };
+            far += found.read.iter().filter(|tile| !beside(tile)).count();
+            let found = pull.horizons(&own, &azimuths, 0.0, &()).expect("horizons");
+            far += found.read.iter().filter(|tile| !beside(tile)).count();
+            for (found, whole) in found.values.iter().zip(&wholes) {
+                let wanted = raster.part(whole, own);
+                let mut cells = found.iter().zip(&wanted);
+                assert!(
+                    cells.all(|(slope, whole)| slope.is_nan() || slope.to_bits() == *whole),
+                    "{about}"
+                );
+            }
+        }
+    }
+    assert!(far > 100, "{far}");
 }

@@ -26,13 +26,15 @@ mod planes;
 mod ray;
 mod strips;
 
+use std::ops::Range;
+
 use antumbra_simd::{Dispatch, Isa};
 use rayon::prelude::*;
 
 use crate::angles::check_azimuths;
 use crate::{Error, HeightField, Monitor, Progress, memory};
 pub use planes::per_cell;
-use planes::turn;
+use planes::{moved, turn};
 use ray::{NEAR, Ray};
 use strips::{LANES, Strips};
 
@@ -55,9 +57,15 @@ impl<'a> Shadows<'a> {
     /// [`Error::NoMemory`]; [`Error::Range`] if heights differ by more than 1e30, such as from a mark of missing data that is taken for a
     /// height.
     pub fn new(field: &'a HeightField<'a>, rise: f64) -> Result<Self, Error> {
-        let known = || field.heights().iter().filter(|height| height.is_finite());
-        let lowest = known().copied().fold(f64::INFINITY, f64::min);
-        let highest = known().copied().fold(f64::NEG_INFINITY, f64::max);
+        let ends = [f64::INFINITY, f64::NEG_INFINITY];
+        // NaN counts for nothing.
+        let [lowest, highest] = field.heights().iter().fold(ends, |[low, high], &height| {
+            let (is_lower, is_higher) = (height < low, height > high);
+            [
+                if is_lower { height } else { low },
+                if is_higher { height } else { high },
+            ]
+        });
         let relief = (highest - lowest).max(0.0);
         let wanted = "at most 1e30; a height that marks missing data is to be named as such, as with gdal_translate -a_nodata";
         Error::check_range("difference of heights", relief, relief <= 1e30, wanted)?;
@@ -91,17 +99,34 @@ impl<'a> Shadows<'a> {
     /// # Ok::<(), antumbra_terrain::Error>(())
     /// ```
     pub fn lit(&self, azimuth: f64, slope: f64) -> Result<Vec<u64>, Error> {
+        self.lit_in([azimuth, slope], &self.field.size().map(|size| 0..size), 0)
+    }
+
+    /// The same for the cells of some columns and rows, as a plane of these. The others may only hide them, up to so many rows (or
+    /// columns, if rays pass more of these) towards the light.
+    fn lit_in(
+        &self,
+        [azimuth, slope]: [f64; 2],
+        part: &[Range<usize>; 2],
+        far: usize,
+    ) -> Result<Vec<u64>, Error> {
         check_azimuths(&[azimuth])?;
         let wanted = "the tangent of an elevation";
         Error::check_range("slope", slope, !slope.is_nan(), wanted)?;
         let ray = Ray::new(self, azimuth, slope.clamp(-STEEP, STEEP));
-        let Grid { columns, rows, .. } = self.grids[usize::from(ray.is_turned)];
-        let mut plane = memory::filled("words", rows * columns.div_ceil(64), 0)?;
-        if self.rise >= 0.0 && slope > f64::NEG_INFINITY {
-            Isa::best().dispatch(Strips::new(self, &ray, &mut plane)?);
+        let mut part = part.clone();
+        if ray.is_turned {
+            part.reverse();
         }
+        let [columns, rows] = &part;
+        let words = columns.start / 64..columns.end.div_ceil(64);
+        let mut plane = memory::filled("words", rows.len() * words.len(), 0)?;
+        if self.rise >= 0.0 && slope > f64::NEG_INFINITY {
+            Isa::best().dispatch(Strips::new(self, &ray, (&part, far), &mut plane)?);
+        }
+        let plane = moved(plane, words.len(), columns.start % 64, columns.len())?;
         match ray.is_turned {
-            true => turn(&plane, [columns, rows]),
+            true => turn(&plane, [columns.len(), rows.len()]),
             false => Ok(plane),
         }
     }
@@ -115,12 +140,24 @@ impl<'a> Shadows<'a> {
         directions: &[[f64; 2]],
         monitor: &dyn Monitor,
     ) -> Result<Vec<Vec<u64>>, Error> {
+        let part = self.field.size().map(|size| 0..size);
+        self.all_lit_in(directions, &part, &vec![0; directions.len()], monitor)
+    }
+
+    /// The same for the cells of some columns and rows, which others hide up to so many rows away in each direction.
+    pub(crate) fn all_lit_in(
+        &self,
+        directions: &[[f64; 2]],
+        part: &[Range<usize>; 2],
+        far: &[usize],
+        monitor: &dyn Monitor,
+    ) -> Result<Vec<Vec<u64>>, Error> {
         let progress = Progress::new(monitor, directions.len());
-        let planes = directions.par_iter().map(|&[azimuth, slope]| {
+        let planes = directions.par_iter().zip(far).map(|(&direction, &far)| {
             if monitor.cancelled() {
                 return Err(Error::Cancelled);
             }
-            let plane = self.lit(azimuth, slope);
+            let plane = self.lit_in(direction, part, far);
             progress.add(1);
             plane
         });
@@ -129,7 +166,7 @@ impl<'a> Shadows<'a> {
 }
 
 /// A slope that is as good as infinite, and whose keys are finite in single precision.
-const STEEP: f64 = 1e20;
+pub(crate) const STEEP: f64 = 1e20;
 
 /// Numbers before the first column, which no crossing near a cell exceeds.
 const PAD: usize = 8;
@@ -160,11 +197,22 @@ impl Grid {
         let [columns, rows] = turned([width, height]);
         let stride = PAD + columns.next_multiple_of(LANES) + 2 * LANES;
         let mut heights = memory::filled("heights", rows * stride, f32::NAN)?;
-        for row in 0..rows {
-            let own = &mut heights[row * stride + PAD..][..columns];
-            for (column, own) in own.iter_mut().enumerate() {
-                let [column, row] = turned([column, row]);
-                *own = (field.heights()[row * width + column] - lowest) as f32;
+        let above = |height: &f64| (height - lowest) as f32;
+        let own = field.heights().chunks_exact(width).enumerate();
+        if by_columns {
+            // Few columns at a time, so that what is written stays near.
+            for first in (0..width).step_by(16) {
+                for (row, own) in own.clone() {
+                    let own = &own[first..width.min(first + 16)];
+                    let places = heights[first * stride + PAD + row..].iter_mut();
+                    let places = places.step_by(stride).zip(own);
+                    places.for_each(|(place, height)| *place = above(height));
+                }
+            }
+        } else {
+            for (row, own) in own {
+                let places = heights[row * stride + PAD..].iter_mut().zip(own);
+                places.for_each(|(place, height)| *place = above(height));
             }
         }
         let mut joined = Vec::new();

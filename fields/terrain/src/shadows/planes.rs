@@ -23,6 +23,20 @@ pub fn turn(plane: &[u64], [columns, rows]: [usize; 2]) -> Result<Vec<u64>, Erro
     Ok(turned)
 }
 
+/// The plane of so many columns of another one with so many words in a row, which begin at a bit of its first words.
+pub fn moved(plane: Vec<u64>, words: usize, bit: usize, columns: usize) -> Result<Vec<u64>, Error> {
+    let count = columns.div_ceil(64);
+    if bit == 0 {
+        return Ok(plane);
+    }
+    let mut moved = memory::room("words", plane.len() / words * count)?;
+    for row in plane.chunks_exact(words) {
+        let next = |word: usize| row.get(word + 1).map_or(0, |next| next << (64 - bit));
+        moved.extend((0..count).map(|word| row[word] >> bit | next(word)));
+    }
+    Ok(moved)
+}
+
 /// Calls `add` for each cell of a raster of this width: with its number, its values, of which all cells have as many, and its bits in up
 /// to 64 planes of [`Shadows::lit`](crate::Shadows::lit), the first one lowest.
 ///

@@ -1,5 +1,7 @@
 //! Strips of light.
 
+use std::ops::Range;
+
 use antumbra_simd::{Lanes, Mask, Simd, Width, WithSimd};
 
 use super::ray::{Eye, NEAR, Ray};
@@ -256,6 +258,11 @@ pub struct Strips<'a> {
     lines: Vec<f32>,
     /// Keys that may hide cells of a row, of crossings near them.
     near: Vec<f32>,
+    /// Columns, and rows from the light, of the cells that are judged, and the strips that they are in.
+    part: [Range<usize>; 2],
+    strips: Range<usize>,
+    /// The first row that may hide them.
+    start: usize,
     plane: &'a mut [u64],
 }
 
@@ -263,9 +270,15 @@ impl<'a> Strips<'a> {
     pub fn new(
         shadows: &'a Shadows<'a>,
         ray: &'a Ray<'a>,
+        ([own, rows], far): (&[Range<usize>; 2], usize),
         plane: &'a mut [u64],
     ) -> Result<Self, Error> {
         let path = Path::new(shadows, ray);
+        let judged = match ray.is_down {
+            true => path.grid.rows - rows.end..path.grid.rows - rows.start,
+            false => rows.clone(),
+        };
+        let [first, last] = [judged.start, judged.end - 1].map(|row| path.line(row).0);
         let Grid { columns, rows, .. } = *path.grid;
         let strips = columns + (ray.shift.abs() * rows as f64).ceil() as usize + 12 + 2 * LANES;
         let list = |length: usize| memory::filled("strips", length, NONE);
@@ -279,6 +292,9 @@ impl<'a> Strips<'a> {
             starts: Vec::new(),
             lines: list(padded)?,
             near: list(padded)?,
+            start: judged.start.saturating_sub(far) / BLOCK * BLOCK,
+            part: [own.clone(), judged],
+            strips: first.min(last) - 1 + own.start..first.max(last) - 1 + own.end,
             plane,
         })
     }
@@ -302,14 +318,18 @@ impl<'a> Strips<'a> {
             path.crossings(&grid.heights, row, 2, &taps, &mut more);
         }
         let count = (grid.columns + 4).div_ceil(LANES);
+        // The last lane has no line on its right, and is of no strip that counts.
+        let Range { start, end } = self.strips;
+        let start = (start + 2).saturating_sub(line) / LANES;
+        let count = count.min((end + 2).saturating_sub(line) / LANES + 1);
         // Strips from line to line have one cell in each row.
         let middle = path.row(grid.joined(), row, -1);
-        for index in 0..count {
+        for index in start..count {
             highest(simd, &own, index, none).store(chunk(lines, LANES * index));
         }
         // Beside a hole a line on a corner may be one that misses it.
         let is_sure = !path.has_holes || part > 0.0 || path.ray.shift == 0.0;
-        for index in 0..if is_sure { count } else { 0 } {
+        for index in start..if is_sure { count } else { 0 } {
             let at = LANES * index;
             let (left, right) = (load::<S>(simd, lines, at), load::<S>(simd, lines, at + 1));
             let height = Vector::<S>::load(simd, &middle[index]) + key;
@@ -317,12 +337,12 @@ impl<'a> Strips<'a> {
             let sure = chunk(&mut self.sure, line - 2 + at);
             found.max(Vector::<S>::load(simd, sure)).store(sure);
         }
-        for index in 0..count {
+        for index in start..count {
             let lines = chunk(lines, LANES * index);
             highest(simd, &more, index, Vector::<S>::load(simd, lines)).store(lines);
         }
         let middle = path.row(&grid.heights, row, -1);
-        for index in 0..count {
+        for index in start..count {
             let at = LANES * index;
             let (left, right) = (load::<S>(simd, lines, at), load::<S>(simd, lines, at + 1));
             let height = Vector::<S>::load(simd, &middle[index]) + key;
@@ -336,8 +356,9 @@ impl<'a> Strips<'a> {
     fn end_block(&mut self, row: usize) {
         let columns = self.path.grid.columns;
         let [first, last] = [row + 1 - BLOCK, row].map(|row| self.path.line(row).0);
-        let start = first.min(last) - 2;
-        let strips = start..first.max(last) + columns;
+        let start = self.strips.start.max(first.min(last) - 2);
+        let end = self.strips.end.min(first.max(last) + columns);
+        let strips = start..end.max(start);
         let (now, before) = (&mut self.now[strips.clone()], &mut self.before[strips]);
         for i in 0..now.len() {
             before[i] = before[i].max(now[i]);
@@ -376,8 +397,15 @@ impl<'a> Strips<'a> {
         );
         let heights = path.row(&grid.heights, row, 0);
         let own_row = path.own_row(row);
-        let words = grid.columns.div_ceil(64);
-        for word in 0..words {
+        let Range { start, end } = self.part[0];
+        let words = start / 64..end.div_ceil(64);
+        let rows = self.part[1].clone();
+        let below = match path.ray.is_down {
+            true => rows.end - 1 - row,
+            false => row - rows.start,
+        };
+        let place = below * words.len();
+        for word in words.clone() {
             let (mut lit, mut open) = (0, 0);
             for part in 0..64 / LANES {
                 let index = 64 / LANES * word + part;
@@ -404,6 +432,9 @@ impl<'a> Strips<'a> {
                 lit |= u64::from(most.lt(own).bits()) << (LANES * part);
                 open |= u64::from(own.le(most).bits() & sure.le(own).bits()) << (LANES * part);
             }
+            let before = (1 << start.saturating_sub(64 * word)) - 1;
+            let mask = u64::MAX >> (64 * (word + 1)).saturating_sub(end) & !before;
+            (lit, open) = (lit & mask, open & mask);
             while open != 0 {
                 let bit = open.trailing_zeros() as usize;
                 open &= open - 1;
@@ -431,7 +462,7 @@ impl<'a> Strips<'a> {
                 );
                 lit |= u64::from(is_lit) << bit;
             }
-            self.plane[own_row * words + word] = lit;
+            self.plane[place + word - words.start] = lit;
         }
     }
 }
@@ -453,13 +484,21 @@ impl WithSimd<LANES> for Strips<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd + Width<LANES>>(mut self, simd: S) {
-        for row in 0..self.path.grid.rows {
-            if let Some(taken) = row.checked_sub(NEAR) {
+        let rows = self.part[1].clone();
+        // Blocks before have nothing.
+        let start = self.start;
+        self.blocks.resize(start / BLOCK, [Vec::new(), Vec::new()]);
+        self.starts.resize(start / BLOCK, 0);
+        for row in start..rows.end {
+            let taken = row.checked_sub(NEAR).filter(|&taken| taken >= start);
+            if let Some(taken) = taken {
                 self.take(simd, taken);
             }
-            self.judge(simd, row);
-            if row >= NEAR && (row - NEAR + 1).is_multiple_of(BLOCK) {
-                self.end_block(row - NEAR);
+            if row >= rows.start {
+                self.judge(simd, row);
+            }
+            if let Some(last) = taken.filter(|taken| (taken + 1).is_multiple_of(BLOCK)) {
+                self.end_block(last);
             }
         }
     }

@@ -18,11 +18,15 @@
 //! once, and nearer ones go first because they mostly hide what is behind them. Of a tile only those squares are read whose peaks
 //! may matter, as rectangles with margins of their own: they are tiles, too.
 
+mod light;
+
+use std::collections::HashSet;
 use std::ops::Range;
 use std::sync::atomic::AtomicBool;
 
+use crate::angles::check_azimuths;
 use crate::march::FAR;
-use crate::{Error, Eyes, HeightField, March, Monitor, Peaks, Shadows, memory, monitor::Share};
+use crate::{Error, Eyes, HeightField, March, Monitor, Peaks, memory, monitor::Share};
 
 /// A rectangle of cells of a raster.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,6 +72,13 @@ impl Tile {
         ways[0].max(ways[1]).max(0)
     }
 
+    /// The smallest tile around this one and another one.
+    fn around(&self, other: &Self) -> Self {
+        let (ends, others) = (self.end(), other.end());
+        let at = [0, 1].map(|axis| self.at[axis].min(other.at[axis]));
+        Self::between(at, [0, 1].map(|axis| ends[axis].max(others[axis])))
+    }
+
     /// Number of cells.
     pub(crate) fn cells(&self) -> usize {
         self.size[0].saturating_mul(self.size[1])
@@ -97,8 +108,8 @@ pub trait Tiles {
         Ok(None)
     }
 
-    /// Heights of all cells of a rectangle, row by row; NaN where there is no data. It is a tile or squares of one, and a cell
-    /// more on each side that is not a border of the raster.
+    /// Heights of all cells of a rectangle, row by row; NaN where there is no data. It may be any rectangle of the raster, such
+    /// as a part of a tile and a cell more on each side that is not a border of the raster.
     fn read(&self, part: Tile) -> Result<Vec<f64>, Self::Error>;
 }
 
@@ -198,20 +209,18 @@ impl<T: Tiles> Pull<'_, T> {
             march.raise(&own.eyes(&own.window), azimuth, &mut slopes, &share)?;
             ways.push(Way { azimuth, slopes });
         }
-        let (read, cells) = self.raise(&own, &mut ways, drop, &Share(monitor, [1, 2]))?;
-        let values = ways.into_iter().map(|way| way.slopes).collect();
-        Ok(Pulled {
-            values,
-            read,
-            cells,
-        })
+        let mut parts = Vec::new();
+        let share = Share(monitor, [1, 2]);
+        self.raise(&own, &mut ways, drop, &mut parts, &share)?;
+        Ok(own.pulled(ways.into_iter().map(|way| way.slopes).collect(), parts))
     }
 
     /// Which cells of a tile, one of the raster or any other rectangle of it, get light from each direction: an azimuth in
     /// degrees and the tangent of an elevation. There is a bit for each cell, as of [`Shadows::lit`].
     ///
-    /// The memory is 8 bytes for each cell and direction, and two tiles. With many directions at once, tiles are read fewer
-    /// times.
+    /// The memory is a bit for each cell and direction, and up to 24 bytes for each cell of a window of at most 12 million cells
+    /// around the tile. With many directions at once it is read fewer times. Where more would be needed, as for a sun near the
+    /// horizon of a large raster, the memory is 8 bytes for each cell and a part of a tile, and the time is longer.
     ///
     /// # Errors
     /// As of [`Pull::horizons`] and [`Shadows::lit`].
@@ -221,68 +230,41 @@ impl<T: Tiles> Pull<'_, T> {
         directions: &[[f64; 2]],
         monitor: &dyn Monitor,
     ) -> Result<Pulled<u64>, T::Error> {
+        let mut order: Vec<usize> = (0..directions.len()).collect();
+        for &[azimuth, slope] in directions {
+            check_azimuths(&[azimuth])?;
+            let wanted = "the tangent of an elevation";
+            Error::check_range("slope", slope, !slope.is_nan(), wanted)?;
+        }
+        order.sort_by(|&a, &b| directions[a][1].total_cmp(&directions[b][1]));
         let own = Own::new(self.tiles, tile)?;
-        let field = own.field(self.tiles)?;
-        let planes =
-            Shadows::new(&field, self.rise)?.all_lit(directions, &Share(monitor, [0, 2]))?;
-        let [width, _] = tile.size;
-        let [column, row] = [0, 1].map(|axis| (tile.at[axis] - own.window.at[axis]) as usize);
-        let words = field.size()[0].div_ceil(64);
-        let mut ways = Vec::new();
-        for (&[azimuth, slope], plane) in directions.iter().zip(&planes) {
-            // A horizon just below the light; none is above infinity.
-            let start = slope.clamp(-STEEP, STEEP).next_down();
-            let mut slopes = memory::room("slopes", own.heights.len())?;
-            slopes.extend((0..own.heights.len()).map(|cell| {
-                let [column, row] = [column + cell % width, row + cell / width];
-                match plane[row * words + column / 64] >> (column % 64) & 1 {
-                    1 => start,
-                    _ => f64::INFINITY,
-                }
-            }));
-            ways.push(Way { azimuth, slopes });
+        let mut parts = Vec::new();
+        let sorted: Vec<[f64; 2]> = order.iter().map(|&index| directions[index]).collect();
+        let planes = self.light(&own, &sorted, &mut parts, monitor)?;
+        let mut values = vec![Vec::new(); directions.len()];
+        for (index, plane) in order.into_iter().zip(planes) {
+            values[index] = plane;
         }
-        let (read, cells) = self.raise(&own, &mut ways, 0.0, &Share(monitor, [1, 2]))?;
-        let mut values = Vec::new();
-        for (Way { slopes, .. }, &[_, slope]) in ways.iter().zip(directions) {
-            let slope = slope.clamp(-STEEP, STEEP);
-            let words = width.div_ceil(64);
-            let mut plane = memory::filled("words", words * tile.size[1], 0)?;
-            for (cell, &own) in slopes.iter().enumerate() {
-                let [column, row] = [cell % width, cell / width];
-                plane[row * words + column / 64] |= u64::from(own < slope) << (column % 64);
-            }
-            values.push(plane);
-        }
-        Ok(Pulled {
-            values,
-            read,
-            cells,
-        })
+        Ok(own.pulled(values, parts))
     }
 
-    /// Raises slopes to the horizons that tiles around give, nearest ones first. Returns which tiles were read, and how many
-    /// cells.
+    /// Raises slopes to the horizons that tiles around give, nearest ones first. Adds the parts of tiles that were read.
     fn raise(
         &self,
         own: &Own,
         ways: &mut [Way],
         drop: f64,
+        read: &mut Vec<(usize, Tile)>,
         monitor: &dyn Monitor,
-    ) -> Result<(Vec<usize>, u64), T::Error> {
+    ) -> Result<(), T::Error> {
         let all = self.tiles.tiles();
+        let lowest = own.lowest + self.rise;
         let least = |numbers: &[f64]| numbers.iter().copied().fold(f64::INFINITY, f64::min);
-        let lowest = least(&own.heights) + self.rise;
         let mut horizons: Vec<f64> = ways.iter().map(|way| least(&way.slopes)).collect();
         let field = own.field(self.tiles)?;
         let steps: Vec<[f64; 2]> = ways.iter().map(|way| field.step(way.azimuth)).collect();
-        let mut order: Vec<usize> = (0..all.len()).collect();
-        // Windows of tiles in the own one have nothing more.
-        order.retain(|&tile| all[tile].within(&own.tile) != all[tile]);
-        order.sort_by_key(|&tile| own.tile.gap(&all[tile]));
-        let (mut read, mut cells) = (Vec::new(), 0);
-        for (index, &tile) in order.iter().enumerate() {
-            let share = Share(monitor, [index, order.len()]);
+        for (index, &tile) in own.order.iter().enumerate() {
+            let share = Share(monitor, [index, own.order.len()]);
             share.progress(0, 1);
             let (eyes, peak) = (own.eyes(&all[tile]), self.tiles.peak(tile));
             let window = all[tile].window(&own.whole);
@@ -299,18 +281,10 @@ impl<T: Tiles> Pull<'_, T> {
                 }
                 continue;
             }
-            let side = all[tile].size[0].max(all[tile].size[1]).next_power_of_two();
-            let peaks = match self.tiles.peaks(tile)? {
-                Some(peaks) => peaks,
-                None => Peaks::from_values(all[tile].size, side, &[peak])?,
-            };
-            let (size, side) = (peaks.size(), peaks.side());
-            let wanted = all[tile].size.map(|cells| cells.div_ceil(side));
-            Error::check_length("columns of peaks of a tile", size[0], wanted[0])?;
-            Error::check_length("rows of peaks of a tile", size[1], wanted[1])?;
-            let mut marks = memory::room("marks", size[0] * size[1])?;
-            marks.resize_with(size[0] * size[1], AtomicBool::default);
-            let levels = peaks.levels()?;
+            let levels = self.levels(tile)?;
+            let [columns, rows] = levels[0].size();
+            let mut marks = memory::room("marks", columns * rows)?;
+            marks.resize_with(columns * rows, AtomicBool::default);
             for &way in &needed {
                 let slopes = &mut ways[way].slopes;
                 eyes.mark(
@@ -322,13 +296,9 @@ impl<T: Tiles> Pull<'_, T> {
                 )?;
             }
             let marks: Vec<bool> = marks.into_iter().map(AtomicBool::into_inner).collect();
-            let parts = rectangles(&marks, size[0]);
-            for [columns, rows] in &parts {
-                let place = |axis: usize, at: usize| all[tile].at[axis] + (at * side) as i64;
-                let at = [place(0, columns.start), place(1, rows.start)];
-                let part = Tile::between(at, [place(0, columns.end), place(1, rows.end)]);
-                let window = part.within(&all[tile]).window(&own.whole);
-                let heights = self.tiles.read(window)?;
+            for window in self.windows(own, tile, &levels[0], &marks) {
+                let heights = self.read(&window)?;
+                read.push((tile, window));
                 let field = HeightField::new(window.size, &heights, self.tiles.transform())?;
                 let march = March::new(&field, self.rise, drop)?;
                 let eyes = own.eyes(&window);
@@ -340,17 +310,50 @@ impl<T: Tiles> Pull<'_, T> {
                         march.raise(&eyes, *azimuth, slopes, &share)?;
                     }
                 }
-                cells += window.cells() as u64;
             }
             for way in needed {
                 horizons[way] = least(&ways[way].slopes);
             }
-            if !parts.is_empty() {
-                read.push(tile);
-            }
         }
         monitor.progress(1, 1);
-        Ok((read, cells))
+        Ok(())
+    }
+
+    /// Peaks of a tile, for stretches of each level.
+    fn levels(&self, tile: usize) -> Result<[Peaks; 3], T::Error> {
+        let size = self.tiles.tiles()[tile].size;
+        let peaks = match self.tiles.peaks(tile)? {
+            Some(peaks) => peaks,
+            None => {
+                let side = size[0].max(size[1]).next_power_of_two();
+                Peaks::from_values(size, side, &[self.tiles.peak(tile)])?
+            }
+        };
+        let (found, side) = (peaks.size(), peaks.side());
+        let wanted = size.map(|cells| cells.div_ceil(side));
+        Error::check_length("columns of peaks of a tile", found[0], wanted[0])?;
+        Error::check_length("rows of peaks of a tile", found[1], wanted[1])?;
+        Ok(peaks.levels()?)
+    }
+
+    /// Windows of the squares of a tile that have a mark.
+    fn windows(&self, own: &Own, tile: usize, peaks: &Peaks, marks: &[bool]) -> Vec<Tile> {
+        let (tile, side) = (self.tiles.tiles()[tile], peaks.side());
+        let parts = rectangles(marks, peaks.size()[0]).into_iter();
+        let windows = parts.map(|[columns, rows]| {
+            let place = |axis: usize, at: usize| tile.at[axis] + (at * side) as i64;
+            let at = [place(0, columns.start), place(1, rows.start)];
+            let part = Tile::between(at, [place(0, columns.end), place(1, rows.end)]);
+            part.within(&tile).window(&own.whole)
+        });
+        windows.collect()
+    }
+
+    /// Heights of a part.
+    fn read(&self, part: &Tile) -> Result<Vec<f64>, T::Error> {
+        let heights = self.tiles.read(*part)?;
+        Error::check_length("heights", heights.len(), part.cells())?;
+        Ok(heights)
     }
 }
 
@@ -377,9 +380,6 @@ fn rectangles(marks: &[bool], columns: usize) -> Vec<[Range<usize>; 2]> {
     found
 }
 
-/// A slope that is as good as infinite, as of [`Shadows`].
-const STEEP: f64 = 1e20;
-
 /// The own tile.
 struct Own {
     whole: Tile,
@@ -387,6 +387,10 @@ struct Own {
     heights: Vec<f64>,
     window: Tile,
     around: Vec<f64>,
+    /// Height of the lowest cell.
+    lowest: f64,
+    /// Numbers of the other tiles, nearest ones first.
+    order: Vec<usize>,
 }
 
 impl Own {
@@ -432,18 +436,43 @@ impl Own {
         {
             heights.extend_from_slice(&row[column..][..tile.size[0]]);
         }
+        let mut order: Vec<usize> = (0..all.len()).collect();
+        // Windows of tiles in the own one have nothing more.
+        order.retain(|&index| all[index].within(tile) != all[index]);
+        order.sort_by_key(|&index| tile.gap(&all[index]));
         Ok(Self {
             whole,
             tile: *tile,
+            lowest: heights.iter().copied().fold(f64::INFINITY, f64::min),
             heights,
             window,
             around,
+            order,
         })
     }
 
     /// The window.
     fn field<T: Tiles>(&self, tiles: &T) -> Result<HeightField<'_>, Error> {
         HeightField::new(self.window.size, &self.around, tiles.transform())
+    }
+
+    /// Another tile, seen from the first cell.
+    fn place(&self, other: &Tile) -> Tile {
+        Tile {
+            at: [0, 1].map(|axis| other.at[axis] - self.tile.at[axis]),
+            size: other.size,
+        }
+    }
+
+    /// Answers, and of which tiles parts were read for them.
+    fn pulled<V>(&self, values: Vec<Vec<V>>, parts: Vec<(usize, Tile)>) -> Pulled<V> {
+        let tiles: HashSet<usize> = parts.iter().map(|(tile, _)| *tile).collect();
+        let order = self.order.iter().copied();
+        Pulled {
+            values,
+            read: order.filter(|tile| tiles.contains(tile)).collect(),
+            cells: parts.iter().map(|(_, part)| part.cells() as u64).sum(),
+        }
     }
 
     /// Eyes at all cells, seen from another tile.
