@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::grid::check_transform;
+use crate::grid::{check_transform, room_for};
 use crate::{Grid, Raster};
 
 /// Mark of cells without data in files that we write.
@@ -22,7 +22,7 @@ struct Header {
 pub fn read(
     bytes: &[u8],
     is_raw: bool,
-    check: impl Fn(&Grid) -> Result<(), String>,
+    check: impl FnOnce(&Grid) -> Result<(), String>,
 ) -> Result<Raster, String> {
     let text = std::str::from_utf8(bytes).map_err(|_| "it is no text")?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
@@ -47,10 +47,7 @@ pub fn read(
     check(&grid)?;
     let no_data = header.no_data.filter(|_| !is_raw);
     let count = grid.width * grid.height;
-    let mut values = Vec::new();
-    values
-        .try_reserve_exact(count)
-        .map_err(|error| error.to_string())?;
+    let mut values = room_for(count)?;
     for (line, text) in lines {
         for word in text.split_whitespace() {
             let value: f64 = word
@@ -65,19 +62,17 @@ pub fn read(
             values.push(if is_data { value } else { f64::NAN });
         }
     }
-    match values.len() == count {
-        true => Ok(Raster {
-            grid,
-            values,
-            height_factor: None,
-        }),
-        false => Err(format!(
-            "found {} values, wanted {} x {} = {count}: the file is not complete",
-            values.len(),
-            grid.width,
-            grid.height
-        )),
+    if values.len() != count {
+        let (found, Grid { width, height, .. }) = (values.len(), grid);
+        return Err(format!(
+            "found {found} values, wanted {width} x {height} = {count}: the file is not complete"
+        ));
     }
+    Ok(Raster {
+        grid,
+        values,
+        height_factor: None,
+    })
 }
 
 impl Header {
@@ -123,16 +118,8 @@ impl Header {
                 "cellsize: found {dx} and {dy}, wanted lengths above 0"
             ));
         }
-        let west = if is_west_centre {
-            west - 0.5 * dx
-        } else {
-            west
-        };
-        let south = if is_south_centre {
-            south - 0.5 * dy
-        } else {
-            south
-        };
+        let west = west - if is_west_centre { 0.5 * dx } else { 0.0 };
+        let south = south - if is_south_centre { 0.5 * dy } else { 0.0 };
         let north = south + dy * height as f64;
         Ok(Grid {
             width,

@@ -1,6 +1,6 @@
 //! Reading GeoTIFF: the crate `tiff` reads tags, and tags of places are ours (OGC 19-008r4, GeoTIFF 1.1).
 
-use std::io::{Cursor, Read, Seek};
+use std::io::{BufReader, Read, Seek, SeekFrom};
 
 use tiff::Directory;
 use tiff::decoder::ifd::Value;
@@ -10,125 +10,134 @@ use tiff::tags::Tag;
 use crate::crs::US_FOOT;
 use crate::grid::check_transform;
 use crate::npy::WorldFile;
-use crate::pixels::{Bytes, Page};
-use crate::{Crs, Grid, Raster};
+use crate::pixels::Page;
+use crate::{Crs, Grid};
 
 /// Notes of GDAL as XML: scale and offset of values, their names and units.
 pub const GDAL_METADATA: u16 = 42_112;
 
-/// What may lie beside a file.
-pub struct Beside<'a> {
-    /// Says where the cells are if the file does not.
-    pub world_file: WorldFile<'a>,
-    /// A mask of the cells with data, as GDAL writes it.
-    pub mask: &'a dyn Fn() -> Result<Option<Vec<u8>>, String>,
-    /// Whether numbers are wanted as they are stored, whatever the file says of their scale and of cells without data.
-    pub is_raw: bool,
+/// What the headers of a file of one band say.
+#[derive(Debug)]
+pub struct Band {
+    pub height_factor: Option<f64>,
+    pub page: Page,
+    /// A mask in the file or beside it.
+    pub mask: Option<Page>,
+    is_raw: bool,
+    no_data: Option<f64>,
+    scale: f64,
+    offset: f64,
 }
 
-/// Reads a file of one band.
-pub fn read(
-    bytes: &[u8],
-    beside: &Beside<'_>,
-    check: impl Fn([usize; 2]) -> Result<(), String>,
-) -> Result<Raster, String> {
-    let (mut decoder, directory, inner) = pages(bytes)?;
-    let page = Page::new(bytes, &mut decoder, &directory, &check)?;
-    let grid = grid(&mut decoder, beside.world_file)?;
-    let crs = grid.crs.as_ref();
-    let no_data = no_data(&mut decoder)?;
-    let notes = string(&mut decoder, Tag::Unknown(GDAL_METADATA)).unwrap_or_default();
-    let [mut scale, mut offset] = scale_and_offset(&notes)?;
-    // Heights in the unit of the ground, if both are known.
-    let of_heights = crs.and_then(Crs::height_metres);
-    let of_heights = of_heights.or_else(|| unit_of_heights(&notes));
-    let of_ground = crs.and_then(Crs::metres);
-    let height_factor = of_heights
-        .zip(of_ground)
-        .map(|(height, ground)| height / ground);
-    scale *= height_factor.unwrap_or(1.0);
-    offset *= height_factor.unwrap_or(1.0);
-    let mut values = page.values(no_data.unwrap_or(0.0))?;
-    if beside.is_raw {
-        return Ok(Raster {
-            grid,
-            values,
-            height_factor,
-        });
-    }
-    for value in &mut values {
-        // Marks of floats are written with fewer digits than the pixels have.
-        let is_mark = |mark: f64| *value == mark || page.is_float() && *value as f32 == mark as f32;
-        let is_data = value.is_finite() && !no_data.is_some_and(is_mark);
-        *value = if is_data {
-            scale * *value + offset
-        } else {
-            f64::NAN
+impl Band {
+    /// Reads the headers, and says where the cells are. Numbers stay as they are stored if they are to be `is_raw`.
+    pub fn new(
+        file: &mut (impl Read + Seek),
+        world_file: WorldFile<'_>,
+        is_raw: bool,
+        check: impl Fn([usize; 2]) -> Result<(), String>,
+    ) -> Result<(Self, Grid), String> {
+        let (mut decoder, directory, inner) = pages(file)?;
+        let page = Page::new(&mut decoder, &directory, &check)?;
+        let crs = crs(&mut decoder);
+        let transform = match transform(&mut decoder, crs.as_ref())? {
+            Some(transform) => check_transform(transform)?,
+            None => world_file()?.ok_or(
+                "it says nowhere where it is; wanted tags of GeoTIFF, or a world file of the same name with the extension .tfw",
+            )?,
         };
+        let no_data = no_data(&mut decoder)?;
+        let notes = string(&mut decoder, Tag::Unknown(GDAL_METADATA)).unwrap_or_default();
+        let [scale, offset] = scale_and_offset(&notes)?;
+        // Heights in the unit of the ground, if both are known.
+        let of_heights = crs.as_ref().and_then(Crs::height_metres);
+        let of_heights = of_heights.or_else(|| unit_of_heights(&notes));
+        let of_ground = crs.as_ref().and_then(Crs::metres);
+        let units = of_heights.zip(of_ground);
+        let height_factor = units.map(|(height, ground)| height / ground);
+        let mask = |inner| mask(&mut decoder, &inner, &page, check);
+        let mask = inner.filter(|_| !is_raw).map(mask).transpose()?;
+        let grid = Grid {
+            width: page.size[0],
+            height: page.size[1],
+            transform,
+            crs,
+        };
+        let band = Self {
+            height_factor,
+            page,
+            mask,
+            is_raw,
+            no_data,
+            scale: scale * height_factor.unwrap_or(1.0),
+            offset: offset * height_factor.unwrap_or(1.0),
+        };
+        Ok((band, grid))
     }
-    let mask = match inner {
-        Some(directory) => Some(mask(bytes, &mut decoder, &directory, &page, &check)?),
-        None => match (beside.mask)()? {
-            Some(outer) => {
-                let (mut decoder, directory, _) = pages(&outer)?;
-                Some(mask(&outer, &mut decoder, &directory, &page, &check)?)
-            }
-            None => None,
-        },
-    };
-    for (value, mask) in values.iter_mut().zip(mask.into_iter().flatten()) {
-        if mask == 0.0 {
-            *value = f64::NAN;
+
+    /// Takes the mask of a file beside this one.
+    pub fn take_mask(
+        &mut self,
+        outer: &mut (impl Read + Seek),
+        check: impl Fn([usize; 2]) -> Result<(), String>,
+    ) -> Result<(), String> {
+        let (mut decoder, directory, _) = pages(outer)?;
+        self.mask = Some(mask(&mut decoder, &directory, &self.page, check)?);
+        Ok(())
+    }
+
+    /// Heights of the cells `[column, row, columns, rows]` of a file, whose mask may be in the file `outer`.
+    pub fn values<R: Read + Seek>(
+        &self,
+        file: &mut R,
+        outer: Option<&mut R>,
+        window: [usize; 4],
+    ) -> Result<Vec<f64>, String> {
+        let missing = self.no_data.unwrap_or(0.0);
+        let mut values = self.page.values(file, window, missing)?;
+        if self.is_raw {
+            return Ok(values);
         }
+        for value in &mut values {
+            // Marks of floats are written with fewer digits than the pixels have.
+            let is_mark =
+                |mark: f64| *value == mark || self.page.is_float() && *value as f32 == mark as f32;
+            let is_data = value.is_finite() && !self.no_data.is_some_and(is_mark);
+            let height = self.scale * *value + self.offset;
+            *value = if is_data { height } else { f64::NAN };
+        }
+        if let Some(mask) = &self.mask {
+            let mask = mask.values(outer.unwrap_or(file), window, 0.0);
+            let mask = mask.map_err(|reason| format!("mask: {reason}"))?;
+            for (value, mask) in values.iter_mut().zip(mask) {
+                if mask == 0.0 {
+                    *value = f64::NAN;
+                }
+            }
+        }
+        Ok(values)
     }
-    Ok(Raster {
-        grid,
-        values,
-        height_factor,
-    })
 }
 
-/// Where the cells of a file are, by the tags of its first page.
-pub fn grid<R: Read + Seek>(
-    decoder: &mut Decoder<R>,
-    world_file: WorldFile<'_>,
-) -> Result<Grid, String> {
-    let (width, height) = decoder.dimensions().map_err(|error| error.to_string())?;
-    let crs = crs(decoder);
-    let transform = match transform(decoder, crs.as_ref())? {
-        Some(transform) => transform,
-        None => world_file()?.ok_or(
-            "it says nowhere where it is; wanted tags of GeoTIFF, or a world file of the same name with the extension .tfw",
-        )?,
-    };
-    Ok(Grid {
-        width: width as usize,
-        height: height as usize,
-        transform: check_transform(transform)?,
-        crs,
-    })
-}
-
-/// Values of a mask, which has the size of its page.
-fn mask<'a>(
-    bytes: &'a [u8],
-    decoder: &mut Bytes<'a>,
+/// A mask, which has the size of its page.
+fn mask(
+    decoder: &mut Decoder<impl Read + Seek>,
     directory: &Directory,
-    page: &Page<'_>,
+    page: &Page,
     check: impl Fn([usize; 2]) -> Result<(), String>,
-) -> Result<Vec<f64>, String> {
-    let mask = Page::new(bytes, decoder, directory, check)?;
+) -> Result<Page, String> {
+    let mask = Page::new(decoder, directory, check)?;
     if mask.size != page.size {
         let ([columns, rows], [width, height]) = (mask.size, page.size);
         return Err(format!(
             "its mask has {columns} x {rows} cells, wanted {width} x {height}"
         ));
     }
-    (mask.values(0.0)).map_err(|reason| format!("mask: {reason}"))
+    Ok(mask)
 }
 
 /// The mark of cells without data, if the file has one.
-fn no_data(decoder: &mut Bytes<'_>) -> Result<Option<f64>, String> {
+fn no_data(decoder: &mut Decoder<impl Read + Seek>) -> Result<Option<f64>, String> {
     match string(decoder, Tag::GdalNodata).as_deref().map(str::trim) {
         None | Some("") => Ok(None),
         Some(text) => text.parse().map(Some).map_err(|_| {
@@ -138,13 +147,19 @@ fn no_data(decoder: &mut Bytes<'_>) -> Result<Option<f64>, String> {
 }
 
 /// A decoder of tags, the directory of the first page, and the directory of its mask.
-fn pages(bytes: &[u8]) -> Result<(Bytes<'_>, Directory, Option<Directory>), String> {
+type Pages<R> = (Decoder<R>, Directory, Option<Directory>);
+
+/// Finds the pages of a file.
+fn pages<R: Read + Seek>(file: &mut R) -> Result<Pages<BufReader<&mut R>>, String> {
     let text = |error: tiff::TiffError| error.to_string();
-    let decoder = Decoder::new(Cursor::new(bytes)).map_err(text)?;
+    let length = file.seek(SeekFrom::End(0));
+    let length = length.and_then(|length| file.rewind().map(|()| length));
+    let length = length.map_err(|error| error.to_string())?;
+    let decoder = Decoder::new(BufReader::new(file)).map_err(text)?;
     let mut limits = Limits::unlimited();
-    // A list of a tag has no more values than the file has bytes.
-    limits.ifd_value_size = bytes.len();
-    limits.decoding_buffer_size = bytes.len() * size_of::<Value>();
+    // A list of a tag has no more values than the file has bytes, and no more than a lattice of 8192 x 8192 tiles.
+    limits.ifd_value_size = length.min(8 << 26) as usize;
+    limits.decoding_buffer_size = length.min(1 << 26) as usize * size_of::<Value>();
     let mut decoder = decoder.with_limits(limits);
     let start = decoder.ifd_pointer().ok_or("it has no page")?;
     let first = decoder.read_directory(start).map_err(text)?;
@@ -253,11 +268,13 @@ fn unit_of_heights(notes: &str) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Cursor;
+
     use tiff::encoder::TiffEncoder;
     use tiff::encoder::colortype::Gray32Float;
 
     use super::*;
-    use crate::Quantity;
+    use crate::{Quantity, Raster};
 
     const HOURS: Quantity<'_> = Quantity {
         name: "hours",
@@ -327,25 +344,14 @@ mod tests {
             .expect("a picture");
         let error = Raster::from_geotiff(plain.get_ref()).expect_err("no place");
         assert!(error.contains(".tfw"), "{error}");
-        let beside = Beside {
-            world_file: &|| Ok(Some(grid.transform)),
-            mask: &|| Ok(None),
-            is_raw: false,
-        };
-        let placed = read(plain.get_ref(), &beside, |_| Ok(()));
-        assert_eq!(placed.expect("a raster").grid, grid);
+        let placed = Band::new(&mut plain, &|| Ok(Some(grid.transform)), false, |_| Ok(()));
+        assert_eq!(placed.expect("a raster").1, grid);
     }
 
     /// Damaged files are errors or other numbers, and never a panic or much memory.
     #[test]
     fn damaged_files_of_gdal_are_refused() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/rasters");
-        let beside = Beside {
-            world_file: &|| Ok(None),
-            mask: &|| Ok(None),
-            is_raw: false,
-        };
-        let check = |size| crate::grid::check_size(size, 1 << 16);
         let (mut state, mut refused) = (1_u64, 0);
         for entry in std::fs::read_dir(folder).expect("a folder") {
             let path = entry.expect("a file").path();
@@ -357,9 +363,83 @@ mod tests {
                 let mut bytes = whole.clone();
                 state = state.wrapping_mul(6_364_136_223_846_793_005) | 1;
                 bytes[place] ^= 1 << (state >> 61);
-                refused += usize::from(read(&bytes, &beside, check).is_err());
+                refused += usize::from(!is_read_in_parts(&bytes, state >> 3));
             }
         }
         assert!(refused > 1000, "{refused} files are refused");
+    }
+
+    /// Whether all cells are read. A window of them, which numbers choose, has the bits of all of them then, and is never a panic.
+    fn is_read_in_parts(bytes: &[u8], mut numbers: u64) -> bool {
+        let mut file = Cursor::new(bytes);
+        let check = |size| crate::grid::check_size(size, 1 << 16);
+        let Ok((band, grid)) = Band::new(&mut file, &|| Ok(None), false, check) else {
+            return false;
+        };
+        let mut below = |end: usize| {
+            let number = numbers as usize % end;
+            numbers /= end as u64;
+            number
+        };
+        let [left, top] = [below(grid.width), below(grid.height)];
+        let [columns, rows] = [1 + below(grid.width - left), 1 + below(grid.height - top)];
+        let part = band.values(&mut file, None, [left, top, columns, rows]);
+        let all = [0, 0, grid.width, grid.height];
+        let Ok(all) = band.values(&mut file, None, all) else {
+            return false;
+        };
+        let lines = all.chunks(grid.width).skip(top).take(rows);
+        let wanted = lines.flat_map(|line| line[left..][..columns].iter().map(|x| x.to_bits()));
+        let part: Vec<u64> = part.expect("a part").iter().map(|x| x.to_bits()).collect();
+        assert_eq!(part, wanted.collect::<Vec<u64>>());
+        true
+    }
+
+    /// A file that counts the bytes that are read.
+    struct Counted<'a>(Cursor<&'a [u8]>, u64);
+
+    impl Read for Counted<'_> {
+        fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+            let count = self.0.read(bytes)?;
+            self.1 += count as u64;
+            Ok(count)
+        }
+    }
+
+    impl Seek for Counted<'_> {
+        fn seek(&mut self, place: SeekFrom) -> std::io::Result<u64> {
+            self.0.seek(place)
+        }
+    }
+
+    /// Bytes that a window of a file reads beside the header.
+    fn bytes_read(bytes: &[u8], window: [usize; 4]) -> (Band, u64) {
+        let mut file = Counted(Cursor::new(bytes), 0);
+        let place: WorldFile<'_> = &|| Ok(Some([0.0, 1.0, 0.0, 0.0, 0.0, -1.0]));
+        let (band, _) = Band::new(&mut file, place, false, |_| Ok(())).expect("a file");
+        file.1 = 0;
+        band.values(&mut file, None, window).expect("a window");
+        (band, file.1)
+    }
+
+    #[test]
+    fn windows_read_the_bytes_of_their_tiles_and_rows_only() {
+        let size = [1300, 1100];
+        let grid = Grid::north_up(size, [0.0; 2], 1.0);
+        let values: Vec<f32> = (0..size[0] * size[1]).map(|cell| cell as f32).collect();
+        let bytes = crate::write("a.tif".as_ref(), &grid, &values, &[HOURS]).expect("a file");
+        let (band, count) = bytes_read(&bytes, [500, 600, 64, 64]);
+        assert_eq!(count, band.page.packed(3) + band.page.packed(4));
+        // One strip without compression.
+        let mut plain = Cursor::new(Vec::new());
+        let mut encoder = TiffEncoder::new(&mut plain).expect("an encoder");
+        let mut image = encoder
+            .new_image::<Gray32Float>(1300, 1100)
+            .expect("a picture");
+        image.rows_per_strip(1100).expect("a strip");
+        image.write_data(&values).expect("a picture");
+        let (band, count) = bytes_read(plain.get_ref(), [500, 600, 64, 64]);
+        assert_eq!(band.page.chunk(), [1300, 1]);
+        assert_eq!(count, 64 * 1300 * 4);
     }
 }

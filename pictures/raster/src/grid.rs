@@ -152,6 +152,14 @@ pub(crate) fn check_size([width, height]: [usize; 2], room: u64) -> Result<(), S
     }
 }
 
+/// A list with room for so many values.
+pub(crate) fn room_for<T>(count: usize) -> Result<Vec<T>, String> {
+    let mut values = Vec::new();
+    let room = values.try_reserve_exact(count);
+    room.map_err(|error| error.to_string())?;
+    Ok(values)
+}
+
 /// Transform of a world file: six lines, of which the last two are the centre of the first cell.
 pub(crate) fn world_file(text: &str) -> Result<[f64; 6], String> {
     let numbers: Option<Vec<f64>> = text

@@ -17,7 +17,7 @@
 //! ```
 //!
 //! - `grid`: where the cells are;  `mesh`: cells as triangles
-//! - `mosaic`: several files as one raster;  `vrt`: those that a .vrt names
+//! - `mosaic`: several files as one raster;  `vrt`: those that a .vrt names;  `parts`: windows of a file
 //! - `geotiff`, `asc`, `npy`: one format each;  `pixels`: strips and tiles of a TIFF;  `cog`: GeoTIFFs that are written
 //! - `crs`: coordinate systems as GeoTIFF describes them
 #![forbid(unsafe_code)]
@@ -30,23 +30,23 @@ mod grid;
 mod mesh;
 mod mosaic;
 mod npy;
+mod parts;
 mod pixels;
 mod vrt;
 
 use std::borrow::Cow;
-use std::cell::Cell;
 use std::fs::{self, File};
-use std::io::{self, BufReader, Cursor, Read, Seek, Write};
+use std::io::{self, Cursor, Read, Seek, Write};
 use std::path::{Path, PathBuf};
-
-use tiff::decoder::Decoder;
+use std::time::SystemTime;
 
 use cog::Cog;
 pub use crs::{Crs, Site, unit_name};
-use geotiff::Beside;
+use geotiff::Band;
 pub use grid::{Grid, RasterCells};
 pub use mesh::RasterMesh;
 pub use mosaic::{Mosaic, Tiles, is_raster, neighbours, read_all};
+pub use parts::Parts;
 
 /// Extensions of files that [`read`] reads.
 pub const EXTENSIONS: [&str; 5] = ["tif", "tiff", "asc", "npy", "vrt"];
@@ -121,7 +121,7 @@ impl Purpose {
 /// | `.asc` | numbers, `NODATA_value` | header |
 /// | `.npy` | two dimensions of numbers; NaN is no data | a world file (`.wld`) |
 ///
-/// A folder, or a `.vrt` of GDAL, is read as [`read_all`] does.
+/// A folder, or a `.vrt` of GDAL, is read as [`read_all`] does. [`Parts`] reads windows of files that are larger than the memory.
 ///
 /// Rows come back from north to south and columns from west to east, unless the raster is turned or sheared.
 ///
@@ -134,65 +134,15 @@ pub fn read(path: &Path, max_bytes: u64, purpose: Purpose) -> Result<Raster, Err
     read_all(&[path.to_path_buf()], max_bytes, purpose).map(|mosaic| mosaic.raster)
 }
 
-/// Where the cells of a file are, by its header, in rows from north to south and columns from west to east.
-fn grid(path: &Path) -> Result<Grid, Error> {
-    let file = open(path).map_err(|source| unread(path, source))?;
-    let tags = |file| Decoder::new(BufReader::new(file)).map_err(|error| error.to_string());
-    let found = match &*extension(path) {
-        "tif" | "tiff" => tags(file)
-            .and_then(|mut tags| geotiff::grid(&mut tags, &|| world_file(path, &["tfw", "wld"]))),
-        kind => start(kind, file, path),
-    };
-    let mut grid = found.map_err(|reason| broken(path, reason))?;
-    if grid.crs.is_none() {
-        grid.crs = system_beside(path);
-    }
-    Ok(grid.upright())
-}
-
-/// Where the cells of a file are that has its header at its start, without reading on.
-fn start(kind: &str, file: File, path: &Path) -> Result<Grid, String> {
-    let mut bytes = Vec::new();
-    let read = file.take(SMALL).read_to_end(&mut bytes);
-    read.map_err(|error| error.to_string())?;
-    let seen = Cell::new(None);
-    let stop = |grid: &Grid| {
-        seen.set(Some(grid.clone()));
-        Err(String::new())
-    };
-    let read = match kind {
-        "asc" => asc::read(&bytes, false, stop),
-        _ => npy::read(&bytes, &|| world_file(path, &["wld"]), stop),
-    };
-    seen.take()
-        .map_or_else(|| read.map(|raster| raster.grid), Ok)
-}
-
 /// Reads one file as it is stored: rows and columns in its own order, and numbers without a meaning if it is to be `is_raw`.
 fn stored(path: &Path, max_bytes: u64, purpose: Purpose, is_raw: bool) -> Result<Raster, Error> {
-    let bytes = read_file(path, max_bytes)?;
-    let room = purpose.room(max_bytes - bytes.len() as u64);
-    let check = |size: [usize; 2]| grid::check_size(size, room);
-    let check_grid = |grid: &Grid| check([grid.width, grid.height]);
-    let mut raster = match extension(path).as_str() {
-        "tif" | "tiff" => {
-            let beside = Beside {
-                world_file: &|| world_file(path, &["tfw", "wld"]),
-                mask: &|| mask(path, max_bytes),
-                is_raw,
-            };
-            geotiff::read(&bytes, &beside, check)
-        }
-        "asc" => asc::read(&bytes, is_raw, check_grid),
-        "npy" => npy::read(&bytes, &|| world_file(path, &["wld"]), check_grid),
-        "vrt" => Err(vrt::not_read("another .vrt")),
-        other => Err(format!("`{other}` is no extension of a raster")),
-    }
-    .map_err(|reason| broken(path, reason))?;
-    if raster.grid.crs.is_none() {
-        raster.grid.crs = system_beside(path);
-    }
-    Ok(raster)
+    let parts = Parts::with_header(path, (max_bytes, purpose), is_raw)?;
+    let all = [0, 0, parts.stored.width, parts.stored.height];
+    Ok(Raster {
+        values: parts.values(all)?,
+        height_factor: parts.height_factor(),
+        grid: parts.stored,
+    })
 }
 
 /// Refuses coordinates in which lengths are not those on the ground.
@@ -337,16 +287,8 @@ impl Raster {
     /// The same raster with its rows from north to south and its columns from west to east, if it has any: squares are cut along
     /// the same diagonal however a file stores them. Turned and sheared rasters stay as they are.
     fn north_up(mut self) -> Self {
-        let [columns, rows] = self.grid.mirrored();
+        mirror(&mut self.values, self.grid.width, self.grid.mirrored());
         self.grid = self.grid.upright();
-        if rows {
-            // All rows, and then the columns of each row back again.
-            self.values.reverse();
-        }
-        if rows != columns {
-            let lines = self.values.chunks_mut(self.grid.width);
-            lines.for_each(<[f64]>::reverse);
-        }
         self
     }
 
@@ -363,12 +305,27 @@ impl Raster {
     /// # Errors
     /// What is wrong.
     pub fn from_geotiff(bytes: &[u8]) -> Result<Self, String> {
-        let nothing = Beside {
-            world_file: &|| Ok(None),
-            mask: &|| Ok(None),
-            is_raw: false,
+        let mut file = Cursor::new(bytes);
+        let (band, grid) = Band::new(&mut file, &|| Ok(None), false, |_| Ok(()))?;
+        let all = [0, 0, grid.width, grid.height];
+        let raster = Self {
+            values: band.values(&mut file, None, all)?,
+            grid,
+            height_factor: band.height_factor,
         };
-        geotiff::read(bytes, &nothing, |_| Ok(())).map(Raster::north_up)
+        Ok(raster.north_up())
+    }
+}
+
+/// Reverses the columns of rows of values, and their rows, or one of them.
+fn mirror(values: &mut [f64], width: usize, [columns, rows]: [bool; 2]) {
+    if rows {
+        // All rows, and then the columns of each row back again.
+        values.reverse();
+    }
+    if rows != columns {
+        let lines = values.chunks_mut(width);
+        lines.for_each(<[f64]>::reverse);
     }
 }
 
@@ -397,21 +354,34 @@ fn unread(path: &Path, source: io::Error) -> Error {
     }
 }
 
+/// Length of a file, and when it was changed.
+type State = (u64, Option<SystemTime>);
+
+/// Opens a regular file of at most so many bytes.
+fn open_within(path: &Path, limit: u64) -> Result<(File, State), Error> {
+    let io = |source| unread(path, source);
+    let file = open(path).map_err(io)?;
+    let data = file.metadata().map_err(io)?;
+    let length = data.len();
+    if length > limit {
+        let reason =
+            format!("the file has {length} bytes, but only {limit} bytes of memory are allowed");
+        return Err(io(io::Error::new(io::ErrorKind::InvalidInput, reason)));
+    }
+    Ok((file, (length, data.modified().ok())))
+}
+
 /// Reads a regular file of at most so many bytes.
 fn read_file(path: &Path, limit: u64) -> Result<Vec<u8>, Error> {
-    let io = |source| unread(path, source);
-    let refused = |message: String| io(io::Error::new(io::ErrorKind::InvalidInput, message));
-    let file = open(path).map_err(io)?;
-    let length = file.metadata().map_err(io)?.len();
-    if length > limit {
-        return Err(refused(format!(
-            "the file has {length} bytes, but only {limit} bytes of memory are allowed"
-        )));
-    }
+    let (file, (length, _)) = open_within(path, limit)?;
+    first_bytes(path, file, length)
+}
+
+/// The first bytes of a file, at most so many.
+fn first_bytes(path: &Path, file: File, most: u64) -> Result<Vec<u8>, Error> {
     let mut bytes = Vec::new();
-    let room = bytes.try_reserve_exact(length as usize);
-    room.map_err(|error| refused(error.to_string()))?;
-    file.take(length).read_to_end(&mut bytes).map_err(io)?;
+    let read = file.take(most).read_to_end(&mut bytes);
+    read.map_err(|source| unread(path, source))?;
     Ok(bytes)
 }
 
@@ -438,16 +408,6 @@ fn beside_mask(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".msk");
     name.into()
-}
-
-/// Bytes of the mask beside a raster.
-fn mask(path: &Path, max_bytes: u64) -> Result<Option<Vec<u8>>, String> {
-    let beside = beside_mask(path);
-    match beside.is_file() {
-        true => read_file(&beside, max_bytes).map(Some),
-        false => Ok(None),
-    }
-    .map_err(|error| error.to_string())
 }
 
 /// Coordinate system of the .prj file beside a raster.

@@ -7,9 +7,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::grid::check_size;
+use crate::grid::{check_size, room_for};
+use crate::parts::grid;
 use crate::{EXTENSIONS, Error, Grid, Purpose, Raster};
-use crate::{broken, check_lengths, companions, extension, grid, stored, vrt};
+use crate::{broken, check_lengths, companions, extension, stored, vrt};
 
 /// Files beside a raster whose headers [`neighbours`] reads.
 const MOST_BESIDE: usize = 400;
@@ -215,9 +216,7 @@ impl Whole {
     /// Cells without data.
     pub fn new(grid: Grid, max_bytes: u64, purpose: Purpose) -> Result<Self, String> {
         check_size([grid.width, grid.height], purpose.room(max_bytes))?;
-        let mut values = Vec::new();
-        let room = values.try_reserve_exact(grid.width * grid.height);
-        room.map_err(|error| error.to_string())?;
+        let mut values = room_for(grid.width * grid.height)?;
         values.resize(grid.width * grid.height, f64::NAN);
         let raster = Raster {
             grid,

@@ -1,70 +1,117 @@
 //! Arrays of numpy (.npy), version 1 to 3 of the format.
 
 use std::borrow::Cow;
-use std::io::{self, Write};
+use std::io::{self, Read, Seek, Write};
 
-use crate::grid::check_transform;
-use crate::{Grid, Raster};
+use crate::Grid;
+use crate::grid::{check_transform, room_for};
+use crate::pixels::bytes;
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// What says where the cells of an array are.
 pub type WorldFile<'a> = &'a dyn Fn() -> Result<Option<[f64; 6]>, String>;
 
-/// Reads an array of two dimensions, whose place is in a world file.
-pub fn read(
-    bytes: &[u8],
-    world_file: WorldFile<'_>,
-    check: impl Fn(&Grid) -> Result<(), String>,
-) -> Result<Raster, String> {
-    let not_npy = || "it is no .npy file".to_owned();
-    let rest = bytes.strip_prefix(MAGIC).ok_or_else(not_npy)?;
-    let &[major, _minor, ref rest @ ..] = rest else {
-        return Err(not_npy());
-    };
-    let (length, rest) = match major {
-        1 => {
-            let (length, rest) = rest.split_first_chunk::<2>().ok_or_else(not_npy)?;
-            (u16::from_le_bytes(*length) as usize, rest)
+/// What the header of an array says.
+#[derive(Debug)]
+pub struct Array {
+    pub grid: Grid,
+    /// Whether the numbers of a column follow each other, and not the numbers of a row.
+    is_fortran: bool,
+    /// Type of the numbers, such as `<f4`.
+    kind: String,
+    /// Bytes of each of them, and before all of them.
+    size: u64,
+    start: u64,
+}
+
+impl Array {
+    /// Reads the header in the first bytes of a file, which has so many.
+    pub fn new(
+        bytes: &[u8],
+        length_of_file: u64,
+        world_file: WorldFile<'_>,
+    ) -> Result<Self, String> {
+        let not_npy = || "it is no .npy file".to_owned();
+        let rest = bytes.strip_prefix(MAGIC).ok_or_else(not_npy)?;
+        let &[major, _minor, ref rest @ ..] = rest else {
+            return Err(not_npy());
+        };
+        let (length, rest) = match major {
+            1 => rest.split_at_checked(2),
+            2 | 3 => rest.split_at_checked(4),
+            _ => return Err(format!("version {major} of .npy is not known")),
         }
-        2 | 3 => {
-            let (length, rest) = rest.split_first_chunk::<4>().ok_or_else(not_npy)?;
-            (u32::from_le_bytes(*length) as usize, rest)
+        .ok_or_else(not_npy)?;
+        // The lowest byte comes first.
+        let length = length.iter().rev();
+        let length = length.fold(0, |sum, &byte| sum << 8 | usize::from(byte));
+        let (head, data) = rest.split_at_checked(length).ok_or_else(not_npy)?;
+        let head = String::from_utf8_lossy(head);
+        let [height, width] = shape(&head)?;
+        let transform = world_file()?.ok_or(
+            "an .npy has no place; add a world file of the same name with the extension .wld, of six lines: cell width, 0, 0, \
+             minus cell height, x and y of the centre of the first cell",
+        )?;
+        let kind = field(&head, "descr").unwrap_or_default();
+        let kind = kind.trim_start_matches(['\'', '"']);
+        let kind: String = kind.chars().take_while(|c| !"'\"".contains(*c)).collect();
+        // The kind is known, so its size follows its letter.
+        numbers(&kind, &[], 0)?;
+        let size: u64 = kind[2..].parse().unwrap_or_default();
+        let start = (bytes.len() - data.len()) as u64;
+        let found = u128::from(length_of_file.saturating_sub(start));
+        let wanted = width as u128 * height as u128 * u128::from(size);
+        if found != wanted {
+            return Err(format!("found {found} bytes of numbers, wanted {wanted}"));
         }
-        _ => return Err(format!("version {major} of .npy is not known")),
-    };
-    let (head, data) = rest.split_at_checked(length).ok_or_else(not_npy)?;
-    let head = String::from_utf8_lossy(head);
-    let [height, width] = shape(&head)?;
-    let transform = world_file()?.ok_or(
-        "an .npy has no place; add a world file of the same name with the extension .wld, of six lines: cell width, 0, 0, \
-         minus cell height, x and y of the centre of the first cell",
-    )?;
-    let grid = Grid {
-        width,
-        height,
-        transform: check_transform(transform)?,
-        crs: None,
-    };
-    check(&grid)?;
-    let is_fortran = field(&head, "fortran_order").is_some_and(|text| text.starts_with("True"));
-    let kind = field(&head, "descr").unwrap_or_default();
-    let kind = kind.trim_start_matches(['\'', '"']);
-    let kind: String = kind.chars().take_while(|c| !"'\"".contains(*c)).collect();
-    let numbers = numbers(&kind, data, width * height)?;
-    let at = |index: usize| match is_fortran {
-        true => numbers[index % width * height + index / width],
-        false => numbers[index],
-    };
-    let values = (0..width * height).map(at);
-    let values = values
-        .map(|value| if value.is_finite() { value } else { f64::NAN })
-        .collect();
-    Ok(Raster {
-        grid,
-        values,
-        height_factor: None,
-    })
+        Ok(Self {
+            grid: Grid {
+                width,
+                height,
+                transform: check_transform(transform)?,
+                crs: None,
+            },
+            is_fortran: field(&head, "fortran_order").is_some_and(|text| text.starts_with("True")),
+            kind,
+            size,
+            start,
+        })
+    }
+
+    /// Columns and rows of cells that follow each other.
+    pub fn chunk(&self) -> [usize; 2] {
+        match self.is_fortran {
+            true => [1, self.grid.height],
+            false => [self.grid.width, 1],
+        }
+    }
+
+    /// Numbers of the cells `[column, row, columns, rows]` of a file, row by row; NaN unless they are finite.
+    pub fn values(
+        &self,
+        file: &mut (impl Read + Seek),
+        [left, top, columns, rows]: [usize; 4],
+    ) -> Result<Vec<f64>, String> {
+        let [width, height] = [self.grid.width, self.grid.height];
+        // Lines of the file, and cells of each.
+        let (length, [first, lines], [before, cells]) = match self.is_fortran {
+            true => (height, [left, columns], [top, rows]),
+            false => (width, [top, rows], [left, columns]),
+        };
+        let mut all = room_for(columns * rows)?;
+        for line in first..first + lines {
+            let from = self.start + (line * length + before) as u64 * self.size;
+            let bytes = bytes(file, from, cells as u64 * self.size)?;
+            let numbers = numbers(&self.kind, &bytes, cells)?.into_iter();
+            all.extend(numbers.map(|x| if x.is_finite() { x } else { f64::NAN }));
+        }
+        if !self.is_fortran {
+            return Ok(all);
+        }
+        let turned = (0..columns * rows).map(|at| all[at % columns * rows + at / columns]);
+        Ok(turned.collect())
+    }
 }
 
 /// Text after a key of the header.
@@ -172,7 +219,20 @@ pub fn write<'a>(
 
 #[cfg(test)]
 mod tests {
+    use std::io::Cursor;
+
     use super::*;
+    use crate::Raster;
+
+    fn read(bytes: &[u8], place: WorldFile<'_>) -> Result<Raster, String> {
+        let array = Array::new(bytes, bytes.len() as u64, place)?;
+        let all = [0, 0, array.grid.width, array.grid.height];
+        Ok(Raster {
+            values: array.values(&mut Cursor::new(bytes), all)?,
+            grid: array.grid,
+            height_factor: None,
+        })
+    }
 
     const PLACE: [f64; 6] = [0.0, 1.0, 0.0, 2.0, 0.0, -1.0];
 
@@ -193,7 +253,7 @@ mod tests {
         let grid = Grid::north_up([3, 2], [0.0, 2.0], 1.0);
         let mut file = Vec::new();
         write(&mut file, &grid, 1, &mut |_| Ok(values.as_slice().into())).expect("a file");
-        let raster = read(&file, place, |_| Ok(())).expect("a raster");
+        let raster = read(&file, place).expect("a raster");
         assert_eq!(raster.grid, grid);
         assert_eq!((raster.values[1], raster.values[5]), (2.0, 6.0));
         assert!(raster.values[2].is_nan());
@@ -202,7 +262,7 @@ mod tests {
             .flat_map(|x| x.to_be_bytes())
             .collect();
         let turned = array(">i2", "True", "(2, 3)", &big);
-        let turned = read(&turned, place, |_| Ok(())).expect("a raster");
+        let turned = read(&turned, place).expect("a raster");
         assert_eq!(turned.values, [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
     }
 
@@ -222,11 +282,11 @@ mod tests {
                 "no .npy",
             ),
         ] {
-            let error = read(&bytes, place, |_| Ok(())).expect_err(word);
+            let error = read(&bytes, place).expect_err(word);
             assert!(error.contains(word), "{error}");
         }
         let whole = array("<f4", "False", "(2, 2)", &[0; 16]);
-        let error = read(&whole, &|| Ok(None), |_| Ok(())).expect_err("no place");
+        let error = read(&whole, &|| Ok(None)).expect_err("no place");
         assert!(error.contains(".wld"), "{error}");
     }
 }

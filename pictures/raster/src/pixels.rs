@@ -3,7 +3,7 @@
 //! The decoder of the crate `tiff` makes pictures: it inverts bands where "white is zero", reads empty tiles from the beginning of
 //! the file, and knows no masks. Heights are no picture, so only its directories of tags are used.
 
-use std::io::{self, Read};
+use std::io::{self, Read, Seek, SeekFrom};
 
 use flate2::read::ZlibDecoder;
 use half::f16;
@@ -13,14 +13,21 @@ use tiff::decoder::Decoder;
 use tiff::tags::{ByteOrder, Tag};
 use weezl::{BitOrder, LzwStatus};
 
-use crate::Memory;
+use crate::grid::room_for;
 
-/// Decoder of bytes in memory.
-pub type Bytes<'a> = Decoder<Memory<&'a [u8]>>;
+/// So many bytes of a file from a place on, or fewer if it ends before.
+pub fn bytes(file: &mut (impl Read + Seek), from: u64, count: u64) -> Result<Vec<u8>, String> {
+    // A damaged file may have a count beyond all memory.
+    let mut bytes = Vec::with_capacity(count.min(1 << 20) as usize);
+    let place = file.seek(SeekFrom::Start(from));
+    let read = place.and_then(|_| file.take(count).read_to_end(&mut bytes));
+    read.map_err(|error| error.to_string())?;
+    Ok(bytes)
+}
 
 /// Tags that a page of pixels has.
-pub struct Page<'a> {
-    bytes: &'a [u8],
+#[derive(Debug)]
+pub struct Page {
     is_big_endian: bool,
     pub size: [usize; 2],
     /// Columns and rows of strips or tiles.
@@ -66,11 +73,10 @@ fn layout(
     Ok((chunk, [Tag::StripOffsets, Tag::StripByteCounts]))
 }
 
-impl<'a> Page<'a> {
+impl Page {
     /// The page that a directory describes. `check` refuses sizes that there is no memory for.
     pub fn new(
-        bytes: &'a [u8],
-        decoder: &mut Bytes<'a>,
+        decoder: &mut Decoder<impl Read + Seek>,
         directory: &Directory,
         check: impl Fn([usize; 2]) -> Result<(), String>,
     ) -> Result<Self, String> {
@@ -115,7 +121,6 @@ impl<'a> Page<'a> {
             check(chunk).map_err(|reason| format!("tiles: {reason}"))?;
         }
         let page = Self {
-            bytes,
             is_big_endian,
             size,
             chunk,
@@ -137,44 +142,81 @@ impl<'a> Page<'a> {
         }
     }
 
+    /// Bytes of a strip or tile in the file.
+    #[cfg(test)]
+    pub fn packed(&self, index: usize) -> u64 {
+        self.counts[index]
+    }
+
     /// Whether values are floats, so that marks are rounded as they are.
     pub fn is_float(&self) -> bool {
         self.format == FLOAT
     }
 
-    /// All values, row by row. Strips and tiles that were never written have the value `missing`.
-    pub fn values(&self, missing: f64) -> Result<Vec<f64>, String> {
-        let [width, height] = self.size;
-        let mut values = Vec::new();
-        let room = values.try_reserve_exact(width * height);
-        room.map_err(|error| error.to_string())?;
-        values.resize(width * height, missing);
-        let across = width.div_ceil(self.chunk[0]);
-        let row_bytes = (self.chunk[0] * self.bits).div_ceil(8);
-        for (index, (&offset, &count)) in self.offsets.iter().zip(&self.counts).enumerate() {
+    /// Columns and rows of cells that are read at once.
+    pub fn chunk(&self) -> [usize; 2] {
+        match self.compression == 1 && !self.is_tiled {
+            true => [self.size[0], 1],
+            false => self.chunk,
+        }
+    }
+
+    /// Values of the cells `[column, row, columns, rows]`, at least one, row by row. Strips and tiles that were never written
+    /// have the value `missing`.
+    pub fn values(
+        &self,
+        file: &mut (impl Read + Seek),
+        [left, top, columns, rows]: [usize; 4],
+        missing: f64,
+    ) -> Result<Vec<f64>, String> {
+        let mut values = room_for(columns * rows)?;
+        values.resize(columns * rows, missing);
+        let [wide, high] = self.chunk;
+        let kind = if self.is_tiled { "tile" } else { "strip" };
+        let row_bytes = (wide * self.bits).div_ceil(8);
+        let [right, bottom] = [left + columns, top + rows];
+        let chunks = (top / high..bottom.div_ceil(high))
+            .flat_map(|row| (left / wide..right.div_ceil(wide)).map(move |column| (row, column)));
+        // Numbers of a row up to the window: predictors begin where the row does.
+        let mut start = Vec::new();
+        for (row, column) in chunks {
+            let index = row * self.size[0].div_ceil(wide) + column;
+            let (offset, count) = (self.offsets[index], self.counts[index]);
             // So GDAL writes those that have no data (SPARSE_OK).
             if count == 0 || offset == 0 {
                 continue;
             }
-            let kind = if self.is_tiled { "tile" } else { "strip" };
             let broken = |reason: String| format!("{kind} {index}: {reason}");
-            let [column, row] = [index % across, index / across];
-            let [left, top] = [column * self.chunk[0], row * self.chunk[1]];
-            let rows = self.chunk[1].min(height - top);
-            let columns = self.chunk[0].min(width - left);
-            let packed = usize::try_from(offset).ok().and_then(|offset| {
-                let end = offset.checked_add(usize::try_from(count).ok()?)?;
-                self.bytes.get(offset..end)
-            });
-            let packed = packed.ok_or_else(|| {
-                broken(format!(
-                    "its {count} bytes from {offset} on end behind the file"
-                ))
-            })?;
-            let mut data = self.unpack(packed, row_bytes * rows).map_err(broken)?;
-            for (row, line) in data.chunks_exact_mut(row_bytes).enumerate() {
-                let first = (top + row) * width + left;
-                self.row(line, &mut values[first..first + columns]);
+            let [west, north] = [column * wide, row * high];
+            let mut first = top.saturating_sub(north);
+            let cells = values.chunks_exact_mut(columns).skip(north + first - top);
+            let wanted = row_bytes * high.min(self.size[1] - north);
+            let (mut from, mut size) = (offset, count);
+            // Lines that are not packed are read where they are.
+            let is_packed = self.compression != 1 || count < wanted as u64;
+            if !is_packed {
+                from = offset.saturating_add((row_bytes * first) as u64);
+                size = (row_bytes * (high.min(bottom - north) - first)) as u64;
+                first = 0;
+            }
+            let mut data = bytes(file, from, size).map_err(broken)?;
+            if (data.len() as u64) < size {
+                let reason = format!("its {count} bytes from {offset} on end behind the file");
+                return Err(broken(reason));
+            }
+            if is_packed {
+                data = self.unpack(&data, wanted).map_err(broken)?;
+            }
+            let skipped = left.saturating_sub(west);
+            for (line, cells) in data.chunks_exact_mut(row_bytes).skip(first).zip(cells) {
+                let cells = &mut cells[west + skipped - left..right.min(west + wide) - left];
+                if skipped == 0 {
+                    self.row(line, cells);
+                    continue;
+                }
+                start.resize(skipped + cells.len(), 0.0);
+                self.row(line, &mut start);
+                cells.copy_from_slice(&start[skipped..]);
             }
         }
         Ok(values)
@@ -189,8 +231,9 @@ impl<'a> Page<'a> {
         };
         let text = |error: io::Error| error.to_string();
         let data = match self.compression {
-            1 => packed[..wanted.min(packed.len())].to_vec(),
-            5 => lzw(packed, wanted)?,
+            1 => packed.to_vec(),
+            // A code has 9 bits or more, and is for at most 4096 bytes.
+            5 => lzw(packed, wanted.min(packed.len().saturating_mul(1 << 12)))?,
             8 | 32_946 => read(&mut ZlibDecoder::new(packed)).map_err(text)?,
             32_773 => pack_bits(packed, wanted),
             50_000 => {
@@ -291,9 +334,7 @@ fn is_one_band(samples: u32, colours: u32, kind: (u16, usize)) -> Result<(), Str
 /// LZW as TIFF has it. Bytes are missing where the code ends early.
 fn lzw(packed: &[u8], wanted: usize) -> Result<Vec<u8>, String> {
     let mut decoder = weezl::decode::Decoder::with_tiff_size_switch(BitOrder::Msb, 8);
-    let mut data = Vec::new();
-    let room = data.try_reserve_exact(wanted);
-    room.map_err(|error| error.to_string())?;
+    let mut data = room_for(wanted)?;
     data.resize(wanted, 0);
     let (mut read, mut written) = (0, 0);
     while written < wanted {
