@@ -45,8 +45,9 @@ pub use crs::{Crs, Site, unit_name};
 use geotiff::Band;
 pub use grid::{Grid, RasterCells};
 pub use mesh::RasterMesh;
-pub use mosaic::{Mosaic, Tiles, is_raster, neighbours, read_all};
+pub use mosaic::{Lattice, Mosaic, Tiles, files, is_raster, neighbours, read_all};
 pub use parts::Parts;
+pub use vrt::{VrtTile, vrt_text};
 
 /// Extensions of files that [`read`] reads.
 pub const EXTENSIONS: [&str; 5] = ["tif", "tiff", "asc", "npy", "vrt"];

@@ -63,13 +63,7 @@ pub fn is_raster(path: &Path) -> bool {
 /// As [`read`](crate::read), of any of the files. A folder without a raster, files whose cells do not fall on each other, and what a
 /// `.vrt` has beside windows of files.
 pub fn read_all(paths: &[PathBuf], max_bytes: u64, purpose: Purpose) -> Result<Mosaic, Error> {
-    let mut files = Vec::new();
-    for path in paths {
-        match path.is_dir() {
-            true => files.extend(rasters_in(path)?),
-            false => files.push(path.clone()),
-        }
-    }
+    let files = files(paths)?;
     match &files[..] {
         [file] if extension(file) == "vrt" => vrt::read(file, max_bytes, purpose),
         [file] => {
@@ -142,50 +136,95 @@ pub fn neighbours(path: &Path) -> Vec<PathBuf> {
     all
 }
 
-/// Several files, of which the first that has data in a cell has the cell.
-fn joined(files: &[PathBuf], max_bytes: u64, purpose: Purpose) -> Result<Mosaic, Error> {
-    if let Some(file) = files.iter().find(|file| !is_tile(file)) {
-        let reason = "several files are one raster if each is a .tif, .asc or .npy; give any other by itself";
-        return Err(broken(file, reason.into()));
-    }
-    let grids = files.iter().map(|file| grid(file));
-    let grids = grids.collect::<Result<Vec<Grid>, Error>>()?;
-    let [first, ..] = &grids[..] else {
-        return Err(broken(Path::new(""), "no file".into()));
-    };
-    let mut places = Vec::with_capacity(files.len());
-    for (file, grid) in files.iter().zip(&grids) {
-        let texts = || [text(file, grid), text(&files[0], first)].join(", and ");
-        let help = "bring both to the same cells, as with gdalwarp -t_srs and -tr with -tap";
-        let place = first.place_of(grid);
-        places.push(place.ok_or_else(|| broken(file, format!("{}; {help}", texts())))?);
-    }
-    let mut ends = [places[0]; 2];
-    for (place, grid) in places.iter().zip(&grids) {
-        for (axis, size) in [grid.width, grid.height].into_iter().enumerate() {
-            ends[0][axis] = ends[0][axis].min(place[axis]);
-            ends[1][axis] = ends[1][axis].max(place[axis] + size as i64);
+/// Files of rasters that are one, in order: of a folder, those that [`read_all`] reads.
+///
+/// # Errors
+/// A folder cannot be read, or has no raster; a file cannot be one of several.
+pub fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Error> {
+    let mut files = Vec::new();
+    for path in paths {
+        match path.is_dir() {
+            true => files.extend(rasters_in(path)?),
+            false => files.push(path.clone()),
         }
     }
-    let [low, high] = ends;
-    // The file in the north west, so that the whole begins where it does.
-    let corner = (0..files.len()).min_by_key(|&index| (places[index][1], places[index][0]));
-    let corner = corner.unwrap_or_default();
-    let mut all = grids[corner].clone();
-    let [x, y] = all.corner((low[0] - places[corner][0]) as f64, 0.0);
-    (all.transform[0], all.transform[3]) = (x, y);
-    [all.width, all.height] = [0, 1].map(|axis| (high[axis] - low[axis]) as usize);
-    check_lengths(&files[0], &all)?;
-    let whole = Whole::new(all, max_bytes, purpose);
+    match files.iter().find(|file| !is_tile(file)) {
+        Some(file) if files.len() > 1 => {
+            let reason = "several files are one raster if each is a .tif, .asc or .npy; give any other by itself";
+            Err(broken(file, reason.into()))
+        }
+        _ => Ok(files),
+    }
+}
+
+/// The cells of files that are one raster.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Lattice {
+    /// All cells, from the north west on.
+    pub whole: Grid,
+    /// Cells of each file.
+    pub grids: Vec<Grid>,
+    /// Column and row of the first cell of each file.
+    pub places: Vec<[usize; 2]>,
+}
+
+impl Lattice {
+    /// Reads the headers of files.
+    ///
+    /// # Errors
+    /// Cells of files do not fall on each other, or coordinates are no lengths.
+    pub fn of(files: &[PathBuf]) -> Result<Self, Error> {
+        let grids = files.iter().map(|file| grid(file));
+        let grids = grids.collect::<Result<Vec<Grid>, Error>>()?;
+        let [first, ..] = &grids[..] else {
+            return Err(broken(Path::new(""), "no file".into()));
+        };
+        let mut places = Vec::with_capacity(files.len());
+        for (file, grid) in files.iter().zip(&grids) {
+            let texts = || [text(file, grid), text(&files[0], first)].join(", and ");
+            let help = "bring both to the same cells, as with gdalwarp -t_srs and -tr with -tap";
+            let place = first.place_of(grid);
+            places.push(place.ok_or_else(|| broken(file, format!("{}; {help}", texts())))?);
+        }
+        let mut ends = [places[0]; 2];
+        for (place, grid) in places.iter().zip(&grids) {
+            for (axis, size) in [grid.width, grid.height].into_iter().enumerate() {
+                ends[0][axis] = ends[0][axis].min(place[axis]);
+                ends[1][axis] = ends[1][axis].max(place[axis] + size as i64);
+            }
+        }
+        let [low, high] = ends;
+        // The file in the north west, so that the whole begins where it does.
+        let corner = (0..files.len()).min_by_key(|&index| (places[index][1], places[index][0]));
+        let corner = corner.unwrap_or_default();
+        let mut whole = grids[corner].clone();
+        let [x, y] = whole.corner((low[0] - places[corner][0]) as f64, 0.0);
+        (whole.transform[0], whole.transform[3]) = (x, y);
+        [whole.width, whole.height] = [0, 1].map(|axis| (high[axis] - low[axis]) as usize);
+        check_lengths(&files[0], &whole)?;
+        let places = places.into_iter();
+        let places = places.map(|place| [0, 1].map(|axis| (place[axis] - low[axis]) as usize));
+        Ok(Self {
+            whole,
+            grids,
+            places: places.collect(),
+        })
+    }
+}
+
+/// Several files, of which the first that has data in a cell has the cell.
+fn joined(files: &[PathBuf], max_bytes: u64, purpose: Purpose) -> Result<Mosaic, Error> {
+    let lattice = Lattice::of(files)?;
+    let whole = Whole::new(lattice.whole, max_bytes, purpose);
     let mut whole = whole.map_err(|reason| broken(&files[0], reason))?;
-    for ((file, grid), [column, row]) in files.iter().zip(&grids).zip(places) {
+    for ((file, grid), place) in files.iter().zip(&lattice.grids).zip(lattice.places) {
         let tile = stored(file, whole.left(max_bytes), Purpose::Values, false)?.north_up();
         if tile.grid != *grid {
             return Err(broken(file, "it was changed while it was read".into()));
         }
         let window = [0, 0, grid.width, grid.height];
         let known = |value: f64| (!value.is_nan()).then_some(value);
-        let put = whole.put(&tile, window, [column - low[0], row - low[1]], known);
+        let put = whole.put(&tile, window, place.map(|at| at as i64), known);
         put.map_err(|reason| broken(file, reason))?;
     }
     Ok(whole.finish(files))

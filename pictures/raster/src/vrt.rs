@@ -9,14 +9,14 @@ use roxmltree::{Document, Node};
 
 use crate::grid::check_transform;
 use crate::mosaic::{Mosaic, Whole};
-use crate::{Crs, Error, Grid, Purpose, broken, check_lengths, read_file, stored};
+use crate::{Crs, Error, Grid, Purpose, Quantity, broken, check_lengths, read_file, stored};
 
 /// Elements and attributes that are read.
 const READ: &str = "VRTDataset rasterXSize rasterYSize SRS dataAxisToSRSAxisMapping GeoTransform VRTRasterBand dataType NoDataValue Offset \
                     Scale SimpleSource ComplexSource SourceFilename relativeToVRT SourceBand SrcRect DstRect xOff yOff xSize ySize NODATA";
 /// Those that change no cell, whatever is in them.
 const HARMLESS: &str = "band blockXSize blockYSize BlockXSize BlockYSize CategoryNames ColorInterp ColorTable Description Histograms Metadata \
-                        name Overview OverviewList resampling shared SourceProperties";
+                        name Overview OverviewList resampling shared SourceProperties UnitType";
 
 /// Reads all files of a virtual raster as one.
 pub fn read(path: &Path, max_bytes: u64, purpose: Purpose) -> Result<Mosaic, Error> {
@@ -43,6 +43,69 @@ pub fn read(path: &Path, max_bytes: u64, purpose: Purpose) -> Result<Mosaic, Err
     // Files may know the system that the document does not name.
     check_lengths(path, &whole.raster.grid)?;
     Ok(whole.finish(&files))
+}
+
+/// A file of a virtual raster that is written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VrtTile {
+    /// Name of the file.
+    pub path: PathBuf,
+    /// Column and row of its first cell.
+    pub at: [usize; 2],
+    /// Numbers of columns and rows.
+    pub size: [usize; 2],
+}
+
+/// A virtual raster of tiles in single precision, NaN without data, all with the same bands. `path` is where the text will be: names of
+/// files in its folder are relative.
+///
+/// The coordinate system is named by its code of EPSG; without one, GDAL takes it from nowhere.
+///
+/// ```
+/// use antumbra_raster::{Grid, Quantity, VrtTile, vrt_text};
+///
+/// let grid = Grid::north_up([4, 2], [600_000.0, 5_340_000.0], 10.0);
+/// let hours = Quantity { name: "hours", unit: "h" };
+/// let tile = VrtTile { path: "out/west.tif".into(), at: [0, 0], size: [2, 2] };
+/// let text = vrt_text("out/hours.vrt".as_ref(), &grid, &[hours], &[tile]);
+/// assert!(text.contains("<SourceFilename relativeToVRT=\"1\">west.tif</SourceFilename>"));
+/// ```
+pub fn vrt_text(path: &Path, grid: &Grid, bands: &[Quantity<'_>], tiles: &[VrtTile]) -> String {
+    let plain = |text: &str| {
+        let text = text.replace('&', "&amp;").replace('<', "&lt;");
+        text.replace('>', "&gt;")
+    };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let transform = grid.transform.map(|number| number.to_string()).join(", ");
+    let code = grid.crs.as_ref().and_then(Crs::epsg);
+    let system = code.map_or(String::new(), |code| format!("  <SRS>EPSG:{code}</SRS>\n"));
+    let mut text = format!(
+        "<VRTDataset rasterXSize=\"{}\" rasterYSize=\"{}\">\n{system}  <GeoTransform>{transform}</GeoTransform>\n",
+        grid.width, grid.height
+    );
+    for (number, Quantity { name, unit }) in bands.iter().enumerate() {
+        let band = number + 1;
+        text += &format!(
+            "  <VRTRasterBand dataType=\"Float32\" band=\"{band}\">\n    <Description>{}</Description>\n    \
+             <UnitType>{}</UnitType>\n    <NoDataValue>nan</NoDataValue>\n",
+            plain(name),
+            plain(unit)
+        );
+        for VrtTile { path, at, size } in tiles {
+            let name = path.strip_prefix(folder);
+            let is_relative = u8::from(name.is_ok() && path.is_relative() == folder.is_relative());
+            let name = plain(&name.unwrap_or(path).to_string_lossy());
+            let ([column, row], [columns, rows]) = (at, size);
+            text += &format!(
+                "    <SimpleSource>\n      <SourceFilename relativeToVRT=\"{is_relative}\">{name}</SourceFilename>\n      \
+                 <SourceBand>{band}</SourceBand>\n      \
+                 <SrcRect xOff=\"0\" yOff=\"0\" xSize=\"{columns}\" ySize=\"{rows}\"/>\n      \
+                 <DstRect xOff=\"{column}\" yOff=\"{row}\" xSize=\"{columns}\" ySize=\"{rows}\"/>\n    </SimpleSource>\n"
+            );
+        }
+        text += "  </VRTRasterBand>\n";
+    }
+    text + "</VRTDataset>\n"
 }
 
 /// Refuses a document with more than windows of files.
