@@ -28,7 +28,11 @@ pub struct FieldSunJob<'a> {
     /// Normals of all cells; 0 without a triangle.
     normals: Vec<[f32; 3]>,
     scene: Option<Scene<'a>>,
+    by: Option<&'a LitBy<'a>>,
 }
+
+/// Finds which cells get light from each of some directions, as [`Shadows::all_lit`] does.
+pub type LitBy<'a> = dyn Fn(&[[f64; 2]], &dyn Monitor) -> Result<Vec<Vec<u64>>, Error> + Sync + 'a;
 
 /// A scene that hides lights as well.
 struct Scene<'a> {
@@ -73,7 +77,14 @@ impl<'a> FieldSunJob<'a> {
             directions: sunlight.on_map(north),
             normals,
             scene: None,
+            by: None,
         })
+    }
+
+    /// The same job, where something else finds what is lit: for a part of a larger raster, of which cells beyond hide lights as well.
+    pub fn lit_by(mut self, by: &'a LitBy<'a>) -> Self {
+        self.by = Some(by);
+        self
     }
 
     /// The job of these cells among the surfaces of a tree, such as houses, which hide lights as the field does. `terrain` is the same
@@ -140,7 +151,10 @@ impl<'a> FieldSunJob<'a> {
     /// The cells that see each of some lights.
     fn lit(&self, lights: Range<usize>, monitor: &dyn Monitor) -> Result<Vec<Vec<u64>>, Error> {
         let directions = &self.directions[lights.clone()];
-        let mut planes = self.shadows.all_lit(directions, monitor)?;
+        let mut planes = match self.by {
+            Some(by) => by(directions, monitor)?,
+            None => self.shadows.all_lit(directions, monitor)?,
+        };
         if let Some(scene) = &self.scene {
             let [width, _] = self.field.size();
             let planes = planes.par_iter_mut().zip(&scene.directions[lights]);

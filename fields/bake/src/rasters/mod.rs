@@ -5,5 +5,5 @@ pub(crate) mod field_sun;
 pub(crate) mod viewshed;
 
 pub use field_horizon::FieldHorizonJob;
-pub use field_sun::FieldSunJob;
+pub use field_sun::{FieldSunJob, LitBy};
 pub use viewshed::{TargetHeightJob, ViewshedJob, Viewsheds};

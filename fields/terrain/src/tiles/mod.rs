@@ -51,11 +51,23 @@ impl Tile {
         Self { at, size }
     }
 
-    /// The part that is in another tile.
-    pub(crate) fn within(&self, other: &Self) -> Self {
+    /// The part that is in another tile; without columns or rows if they do not touch.
+    pub fn within(&self, other: &Self) -> Self {
         let (ends, others) = (self.end(), other.end());
         let at = [0, 1].map(|axis| self.at[axis].max(other.at[axis]));
         Self::between(at, [0, 1].map(|axis| ends[axis].min(others[axis])))
+    }
+
+    /// Whether they have a common cell.
+    pub fn touches(&self, other: &Self) -> bool {
+        self.within(other).cells() > 0
+    }
+
+    /// The tile with so many columns and rows of the whole around it.
+    pub fn with_margin(&self, margin: [i64; 2], whole: &Self) -> Self {
+        let at = [0, 1].map(|axis| self.at[axis].saturating_sub(margin[axis]));
+        let end = [0, 1].map(|axis| self.end()[axis].saturating_add(margin[axis]));
+        Self::between(at, end).within(whole)
     }
 
     /// The tile with its margin.
