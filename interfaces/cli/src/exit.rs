@@ -113,6 +113,15 @@ impl From<antumbra_bake::Error> for Failure {
     }
 }
 
+impl From<antumbra_tiles::Error> for Failure {
+    fn from(error: antumbra_tiles::Error) -> Self {
+        match error {
+            antumbra_tiles::Error::Terrain(error) => antumbra_bake::Error::from(error).into(),
+            _ => Self::Scene(error.to_string()),
+        }
+    }
+}
+
 impl From<antumbra_load::Error> for Failure {
     fn from(error: antumbra_load::Error) -> Self {
         use antumbra_load::Error;
@@ -179,6 +188,14 @@ static DRAWN: Mutex<bool> = Mutex::new(false);
 /// Sets how much is said.
 pub fn set_loudness(loudness: Loudness) {
     LOUDNESS.store(loudness as u8, Ordering::Relaxed);
+}
+
+/// Does something while no more is said than this.
+pub fn quietly<T>(loudness: Loudness, work: impl FnOnce() -> T) -> T {
+    let before = LOUDNESS.swap(loudness as u8, Ordering::Relaxed);
+    let found = work();
+    LOUDNESS.store(before, Ordering::Relaxed);
+    found
 }
 
 /// Whether only errors are said.

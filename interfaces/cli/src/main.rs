@@ -5,7 +5,7 @@
 //! standard output.
 //!
 //! - `args/`: commands and flags, each defined once with its help
-//! - `render/`, `view`, `merge`, `farm/`, `study`, `bench`, `bake/`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
+//! - `render/`, `view`, `merge`, `farm/`, `plan/`, `study`, `bench`, `bake/`, `info`, `image_tools`, `list`, `man`, `demo`: one command each
 //! - `scenes`: scenes that the command line names
 //! - `table`, `json`, `output`: results as text, JSON and files;  `archive`: files of this program's own kinds
 //! - `version`, `progress/`, `interrupt`, `exit`: what this program is, how far it is, how it ends
@@ -27,6 +27,7 @@ mod list;
 mod man;
 mod merge;
 mod output;
+mod plan;
 mod progress;
 mod render;
 mod scenes;
@@ -74,6 +75,10 @@ fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Some(Command::View(args)) => view::run(&args, memory),
         Some(Command::Merge(args)) => merge::run(&args, memory),
         Some(Command::Farm(command)) => farm::run(&command),
+        Some(Command::Index(args)) => plan::survey(&args),
+        Some(Command::Plan(args)) => plan::make(&args, memory),
+        Some(Command::Run(args)) => plan::run(&args, memory),
+        Some(Command::Check(args)) => plan::check(&args),
         Some(Command::Study(args)) => study::run(&args, memory),
         Some(Command::Bench(args)) => bench::run(&args, memory),
         Some(Command::Bake(command)) => bake::run(command.args().0, memory, None),

@@ -13,10 +13,22 @@ use crate::json::Destination;
 use crate::output::{Files, text};
 use crate::render::{check_image_names, hash_text};
 use crate::version::VERSION;
-use crate::{archive, interrupt, json};
+use crate::{archive, interrupt, json, plan};
 
 /// Runs the command.
 pub fn run(args: &MergeArgs, memory: MemorySize) -> Result<(), Failure> {
+    if args.parts.iter().any(|path| plan::is_plan(path)) {
+        return match plan::merge(args, memory)? {
+            Some(parts) => run(
+                &MergeArgs {
+                    parts,
+                    ..args.clone()
+                },
+                memory,
+            ),
+            None => Ok(()),
+        };
+    }
     if args.parts.iter().any(|path| is_part(path)) {
         return bake::merge::run(args, memory);
     }

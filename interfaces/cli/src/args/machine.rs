@@ -1,6 +1,7 @@
 //! Flags about the machine: instruction set and threads.
 
 use std::num::NonZeroUsize;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use antumbra::Isa;
 use clap::Args;
@@ -44,8 +45,12 @@ impl MachineArgs {
     }
 }
 
-/// Starts this many threads, or one per CPU.
+/// Starts this many threads, or one per CPU. Where some were started before, these go on.
 pub fn start_threads(threads: Option<NonZeroUsize>) -> Result<(), Failure> {
+    static HAS_THREADS: AtomicBool = AtomicBool::new(false);
+    if HAS_THREADS.swap(true, Ordering::Relaxed) {
+        return Ok(());
+    }
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads.map_or(0, NonZeroUsize::get))
         .build_global()

@@ -8,9 +8,9 @@ use super::{heading, values};
 use crate::json::Destination;
 
 /// Flags of `merge`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub struct MergeArgs {
-    /// All parts of one picture or bake, in any order
+    /// All parts of one picture or bake, or a plan
     #[arg(required = true, value_name = "PART")]
     pub parts: Vec<PathBuf>,
     /// File to write; - is the standard output

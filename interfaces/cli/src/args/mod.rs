@@ -21,6 +21,7 @@ mod map;
 mod merge;
 mod names;
 mod picture;
+mod plan;
 mod raster;
 mod render;
 mod sensors;
@@ -51,6 +52,7 @@ pub use man::{CompletionsArgs, ManArgs};
 pub use map::MapArgs;
 pub use merge::MergeArgs;
 pub use picture::PictureArgs;
+pub use plan::{CheckArgs, IndexArgs, PlanArgs, RunArgs};
 pub use raster::RasterArgs;
 pub use render::{RenderArgs, UntilArgs};
 pub use sensors::{NorthArgs, PlaceArgs, UnitArgs, up_axis};
@@ -170,6 +172,31 @@ pub enum Command {
     /// Spread a rendering over the machines of a scheduler
     #[command(subcommand)]
     Farm(FarmCommand),
+    /// Make height rasters of many files one, by an index
+    ///
+    /// Then horizon and sun take the index as a scene, and `plan` divides their work into tiles, which need no more memory than a
+    /// tile and have the bits of the whole. All cells are read once. Example:
+    ///
+    /// antumbra index tiles/*.tif -o country.index
+    Index(IndexArgs),
+    /// Divide a job into tasks that any engine can run
+    ///
+    /// A plan is text: a line for each task, with its id, what it reads with checksums, the tasks whose results it needs, and estimates of
+    /// its seconds and its memory. Of an index, tasks are tiles; of other scenes, shares of the work. Says what all tasks take,
+    /// before anything is run. Example:
+    ///
+    /// antumbra plan country.index -o plan.jsonl sun --cells --from 2025-01-01 --to 2025-12-31 --step 60
+    Plan(PlanArgs),
+    /// Run a task of a plan, or all
+    ///
+    /// A task writes a file in the folder of the plan by renaming it, and then a receipt with its checksum. A task that is done is not
+    /// run again. Two runs of one task do no harm: both find the same bits, or the second one says that it does not.
+    Run(RunArgs),
+    /// Say which tasks of a plan are done
+    ///
+    /// Looks at all receipts and checksums, and prints the ids of tasks that are to be run: they are missing, stale (of another plan or
+    /// of other inputs), or disagree with their receipts. The exit code is 1 if there are any.
+    Check(CheckArgs),
     /// Compare the work of shadow rays by orders, trees and widths
     ///
     /// Every order is rendered once with the default tree and collapse. Every other tree and collapse is rendered

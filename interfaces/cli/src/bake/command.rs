@@ -1,6 +1,5 @@
 //! The steps that all bakes have in common.
 
-use std::cell::Cell;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -8,6 +7,7 @@ use antumbra::{Bvh, Isa, Recipe};
 use antumbra_bake::{Error, Job, Key, Work};
 use antumbra_lab::{Machine, count};
 use antumbra_load::MemorySize;
+use antumbra_tiles::Indexed;
 use serde::{Serialize, Serializer};
 
 use super::chunks::{self, PartFile};
@@ -16,6 +16,7 @@ use super::map;
 use super::neighbours::tell_neighbours;
 use super::raster::is_raster;
 use super::terrain::Terrain;
+use super::tile::{TileWork, Tiling};
 use super::visible::VisibleArgs;
 use crate::args::ChunkArgs;
 use crate::exit::{Failure, tell};
@@ -31,6 +32,17 @@ pub trait Baking: Shared {
 
     /// Computes and writes everything. `files` are to note what is read and written beside the arguments of all bakes.
     fn bake(&self, bake: &Bake<'_>, files: Files) -> Result<(), Failure>;
+
+    /// How tiles of a raster of many files are computed.
+    ///
+    /// # Errors
+    /// The command has no tiles, or not with these flags.
+    fn tiling(&self, raster: &Indexed) -> Result<Tiling, Failure> {
+        let _ = raster;
+        Err(Failure::usage(
+            "tiles of an index are for horizon and sun with --cells",
+        ))
+    }
 
     /// Files that are written beside `--output` and `--json`, and files that are read beside the scene.
     fn files(&self) -> [Vec<Named<'_>>; 2] {
@@ -101,6 +113,19 @@ pub fn run(
     memory: MemorySize,
     parts: Option<&[PartFile]>,
 ) -> Result<(), Failure> {
+    run_some(args, memory, (parts, None))
+}
+
+/// Runs a command for a tile of its raster.
+pub fn run_tile(args: &dyn Baking, memory: MemorySize, tile: &TileWork<'_>) -> Result<(), Failure> {
+    run_some(args, memory, (None, Some(tile)))
+}
+
+fn run_some(
+    args: &dyn Baking,
+    memory: MemorySize,
+    (parts, tile): (Option<&[PartFile]>, Option<&TileWork<'_>>),
+) -> Result<(), Failure> {
     let (scene, outputs, json, chunks) = args.shared();
     let isa = chunks.machine.isa()?;
     let is_other = |path: &&PathBuf| scene.len() > 1 && !is_raster(std::slice::from_ref(path));
@@ -118,8 +143,8 @@ pub fn run(
         chunks,
         isa,
         memory,
-        has_threads: Cell::new(false),
         parts,
+        tile,
     };
     let maps = if args.is_picture() { &[] } else { outputs };
     let world_files = map::world_files(maps)?;
@@ -140,9 +165,10 @@ pub struct Bake<'a> {
     chunks: &'a ChunkArgs,
     pub isa: Isa,
     memory: MemorySize,
-    has_threads: Cell<bool>,
     /// Shares to take instead of computing anything.
     pub parts: Option<&'a [PartFile]>,
+    /// The tile to compute instead of the whole.
+    pub tile: Option<&'a TileWork<'a>>,
 }
 
 /// A job that was computed.
@@ -225,12 +251,9 @@ impl Bake<'_> {
         Ok(files)
     }
 
-    /// Starts the threads, once.
+    /// Starts the threads.
     fn start_threads(&self) -> Result<(), Failure> {
-        match self.has_threads.replace(true) {
-            true => Ok(()),
-            false => self.chunks.machine.start_threads(),
-        }
+        self.chunks.machine.start_threads()
     }
 
     /// Starts the threads, reads the scene and builds its tree, [bent](Ground::load) if flags say so.
@@ -247,13 +270,19 @@ impl Bake<'_> {
     /// Starts the threads and reads a height raster around the scene.
     pub fn terrain_of(&self, raster: &[PathBuf], files: &mut Files) -> Result<Terrain, Failure> {
         self.start_threads()?;
-        Terrain::load(raster, self.memory, files)
+        match self.tile {
+            Some(work) => {
+                let name = antumbra_load::raster_name(raster);
+                Terrain::of_tile(work.raster, &work.tile, name)
+            }
+            None => Terrain::load(raster, self.memory, files),
+        }
     }
 
     /// Says which files beside a height raster go on where it ends, if it is one. Not for lines between two of its points, which stay
     /// inside of it.
     pub fn tell_neighbours(&self, raster: &[PathBuf]) {
-        if self.parts.is_none() {
+        if self.parts.is_none() && self.tile.is_none() {
             tell_neighbours(raster, self.memory);
         }
     }

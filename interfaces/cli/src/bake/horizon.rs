@@ -6,13 +6,14 @@ use std::time::Instant;
 
 use antumbra::LocalOrigin;
 use antumbra_bake::{
-    Array, Direction, Entry, FieldHorizonJob, FieldSky, HeightField, HorizonJob, Lattice,
+    Array, Direction, Entry, Error, FieldHorizonJob, FieldSky, HeightField, HorizonJob, Lattice,
     Orientation, Sensors, SkyMeasure, SkyValues,
 };
 use antumbra_image::atomic_write_seeking;
 use antumbra_lab::count;
 use antumbra_raster::{Grid, Quantity, Site};
-use antumbra_terrain::Share;
+use antumbra_terrain::{Monitor, Share};
+use antumbra_tiles::Indexed;
 use clap::{ArgGroup, Args, ValueEnum};
 
 use super::command::{Bake, Baking, Done, Figure, Named};
@@ -22,6 +23,7 @@ use super::places::{self, Places};
 use super::raster;
 use super::site::Asked;
 use super::terrain::is_terrain;
+use super::tile::Tiling;
 use crate::args::{
     ChunkArgs, MapArgs, PlaceArgs, RasterArgs, SCENE, heading, rasters_long, values,
 };
@@ -158,6 +160,27 @@ impl HorizonArgs {
         }
     }
 
+    /// Azimuths from true north, and directions on the map.
+    fn directions(&self, field: &HeightField<'_>) -> Result<(Vec<f64>, Vec<Direction>), Failure> {
+        // Clockwise from the north of the map.
+        let north = self.places.north.degrees();
+        Ok(match self.azimuths() {
+            Azimuths::Even(count) => {
+                let azimuths = self.degrees(count);
+                let of = |azimuth: &f64| Direction::new(field, azimuth + north);
+                let directions: Vec<Direction> = azimuths.iter().map(of).collect();
+                (azimuths, directions)
+            }
+            Azimuths::Lattice(count) => {
+                let lattice = Lattice::new(field, count).map_err(Failure::usage)?;
+                let azimuths = lattice.azimuths.into_iter();
+                let azimuths = azimuths.map(|azimuth| (azimuth - north).rem_euclid(360.0));
+                let directions = lattice.steps.into_iter().map(Direction::Step);
+                (azimuths.collect(), directions.collect())
+            }
+        })
+    }
+
     /// Degrees of `count` azimuths from north through east, from 0 to 360.
     fn degrees(&self, count: u32) -> Vec<f64> {
         let step = 360.0 / f64::from(count);
@@ -209,6 +232,33 @@ impl Baking for HorizonArgs {
         [Vec::new(), self.places.files().to_vec()]
     }
 
+    fn tiling(&self, raster: &Indexed) -> Result<Tiling, Failure> {
+        if !self.is_of_cells() {
+            let reason = "tiles of an index are for --cells of the index";
+            return Err(Failure::usage(reason));
+        }
+        let index = raster.index();
+        // Where no azimuth follows from the place, a plan can do without the files.
+        if matches!(self.azimuths(), Azimuths::Even(_)) {
+            let grid = raster.grid(&index.whole())?;
+            let middle = [0, 1, 2].map(|axis| 0.5 * (index.low[axis] + index.high[axis]));
+            let asked = Asked::new(&self.raster, &self.places);
+            asked.settle("index", grid.crs.as_ref(), middle)?;
+        }
+        let field = HeightField::new([2, 2], &[0.0; 4], index.transform);
+        let (azimuths, directions) = self.directions(&field.map_err(Error::from)?)?;
+        let Quantity { name, unit } = self.show.quantity();
+        let names = match self.show {
+            Shown::Angles => azimuths.iter().map(column_name).collect(),
+            _ => vec![name.to_owned()],
+        };
+        let bands = names.into_iter().map(|name| [name, unit.to_owned()]);
+        Ok(Tiling {
+            directions,
+            bands: bands.collect(),
+        })
+    }
+
     fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
         bake.tell_neighbours(&self.scene);
         if self.is_of_cells() {
@@ -248,29 +298,21 @@ fn of_cells(args: &HorizonArgs, bake: &Bake<'_>, mut files: Files) -> Result<(),
     let site = terrain.settle(&Asked::new(&args.raster, &args.places))?;
     map::check_cells(&terrain, args.output.iter())?;
     let field = terrain.field()?;
-    let (grid, values) = (
-        terrain.grid(args.raster.crs.as_ref()),
-        &terrain.heights.raster.values,
-    );
-    // Clockwise from the north of the map.
+    let values = &terrain.heights.raster.values;
     let north = args.places.north.degrees();
-    let (azimuths, directions) = match args.azimuths() {
-        Azimuths::Even(count) => {
-            let azimuths = args.degrees(count);
-            let of = |azimuth: &f64| Direction::new(&field, azimuth + north);
-            let directions: Vec<Direction> = azimuths.iter().map(of).collect();
-            (azimuths, directions)
-        }
-        Azimuths::Lattice(count) => {
-            let lattice = Lattice::new(&field, count).map_err(Failure::usage)?;
-            let azimuths = lattice.azimuths.into_iter();
-            let azimuths = azimuths.map(|azimuth| (azimuth - north).rem_euclid(360.0));
-            let directions = lattice.steps.into_iter().map(Direction::Step);
-            (azimuths.collect(), directions.collect())
-        }
-    };
+    let (azimuths, directions) = args.directions(&field)?;
     let rise = args.places.placement.height / args.places.units.metres();
+    if let Some((work, part)) = bake.tile.and_then(|work| Some((work, work.quarter?))) {
+        let progress = Progress::new(&terrain.name);
+        work.sweep(part, &directions, rise, &progress)?;
+        progress.finish();
+        return Ok(());
+    }
     let job = FieldHorizonJob::new(&field, &directions, rise, 0.0)?;
+    let plane: &PlaneOf<'_> = match bake.tile {
+        Some(work) => &work.plane(&directions, rise),
+        None => &|index, monitor| Ok(job.plane(index, monitor)?),
+    };
     let horizon = Horizon {
         name: &terrain.name,
         show: args.show,
@@ -282,12 +324,17 @@ fn of_cells(args: &HorizonArgs, bake: &Bake<'_>, mut files: Files) -> Result<(),
     if let ([path], true, Shown::Angles) = (bake.outputs, bake.is_whole(), args.show)
         && has_planes(path)
     {
-        return horizon.write_planes(bake, path, &grid, &job);
+        return horizon.write_planes(
+            bake,
+            path,
+            &terrain.own_grid(args.raster.crs.as_ref()),
+            &|index, monitor| Ok(terrain.own(&plane(index, monitor)?).into_owned()),
+        );
     }
     let (done, quadrature_error) = match args.show.measure() {
         None => (bake.compute_cells(&job, &terrain.name)?, None),
         Some(measure) => {
-            let found = horizon.sky(bake, (&field, measure), &job)?;
+            let found = horizon.sky(bake, (&field, measure, &directions), &job, plane)?;
             let quadrature_error = found.found.as_ref().and_then(|sky| sky.quadrature_error);
             (found.map(|sky| Ok(sky.values))?, quadrature_error)
         }
@@ -308,11 +355,14 @@ fn of_cells(args: &HorizonArgs, bake: &Bake<'_>, mut files: Files) -> Result<(),
                 let sheet = map::Sheet::of_cells(&args.map, &terrain, place)?;
                 sheet.write(path, &horizon.words(args, site), planes)
             }
-            _ => raster::write_values(path, &grid, planes, bands),
+            _ => terrain.write(path, args.raster.crs.as_ref(), planes, bands),
         }
     })?;
     horizon.end(bake, (all, quadrature_error), &done, || ())
 }
+
+/// Finds the angles of all cells in the direction of a number.
+type PlaneOf<'a> = dyn Fn(usize, &dyn Monitor) -> Result<Vec<f32>, Failure> + 'a;
 
 /// Whether a file has all azimuths as planes of cells.
 fn has_planes(path: &Path) -> bool {
@@ -352,7 +402,7 @@ impl Horizon<'_> {
         bake: &Bake<'_>,
         path: &Path,
         grid: &Grid,
-        job: &FieldHorizonJob<'_>,
+        plane: &PlaneOf<'_>,
     ) -> Result<(), Failure> {
         let (start, planes) = (Instant::now(), self.azimuths.len());
         check_room(path, 4 * (planes * grid.width * grid.height) as u64)?;
@@ -361,7 +411,7 @@ impl Horizon<'_> {
         let names = self.names();
         let written = atomic_write_seeking(path, |file| {
             antumbra_raster::write_planes(path, file, grid, &self.bands(&names), &mut |index| {
-                let plane = job.plane(index, &Share(&progress, [index, planes]));
+                let plane = plane(index, &Share(&progress, [index, planes]));
                 let plane = plane.map_err(|error| {
                     failure = Some(error);
                     io::Error::other("cancelled")
@@ -372,7 +422,7 @@ impl Horizon<'_> {
             })
         });
         progress.finish();
-        failure.map_or(Ok(()), |error| Err(Failure::from(error)))?;
+        failure.map_or(Ok(()), Err)?;
         written?;
         let done = Done::whole((), start.elapsed().as_secs_f64());
         self.end(bake, (all, None), &done, || ())
@@ -382,8 +432,9 @@ impl Horizon<'_> {
     fn sky(
         &self,
         bake: &Bake<'_>,
-        (field, measure): (&HeightField<'_>, SkyMeasure),
+        (field, measure, directions): (&HeightField<'_>, SkyMeasure, &[Direction]),
         job: &FieldHorizonJob<'_>,
+        plane: &PlaneOf<'_>,
     ) -> Result<Done<SkyValues>, Failure> {
         if !bake.is_whole() {
             let done = bake.compute_cells(job, self.name)?;
@@ -391,9 +442,15 @@ impl Horizon<'_> {
         }
         check_answers(self.name, FieldSky::memory(field))?;
         let (start, progress) = (Instant::now(), Progress::new(self.name));
-        let sky = job.sky(measure, &progress)?;
+        let mut sky = FieldSky::new(field, directions, measure).map_err(Error::from)?;
+        for index in 0..directions.len() {
+            sky.add(
+                index,
+                &plane(index, &Share(&progress, [index, directions.len()]))?,
+            );
+        }
         progress.finish();
-        Ok(Done::whole(sky, start.elapsed().as_secs_f64()))
+        Ok(Done::whole(sky.finish(), start.elapsed().as_secs_f64()))
     }
 
     /// Words of a map.

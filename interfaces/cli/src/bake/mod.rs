@@ -8,6 +8,7 @@
 //! - `command`: the steps that all of them have in common
 //! - `site`: where on the earth a scene is
 //! - `ground`, `parts`, `places`, `view`: scenes, names of their triangles, and points of them;  `terrain`: height rasters without either
+//! - `tile`: tiles of rasters of many files
 //! - `neighbours`: tiles beside a height raster
 //! - `chunks`: files of unfinished work and of shares
 //! - `files`: formats and writers of results;  `map`: maps of grids and cells;  `raster`: results as GeoTIFF, .asc and .npy
@@ -28,6 +29,7 @@ mod raster;
 pub mod site;
 mod sun;
 mod terrain;
+pub mod tile;
 mod view;
 mod visible;
 
@@ -36,7 +38,8 @@ use std::path::PathBuf;
 use crate::args::ChunkArgs;
 use crate::json::Destination;
 
-pub use command::run;
+pub use command::{run, run_tile};
+pub use raster::write_values;
 
 command::bakes! {
     /// Bake ambient occlusion: of vertices, a texture or a picture

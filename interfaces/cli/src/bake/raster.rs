@@ -7,12 +7,14 @@ use antumbra_image::atomic_write;
 use antumbra_raster::{Crs, Grid, Quantity, RasterCells};
 
 use super::ground::Ground;
+use super::tile::is_index;
 use crate::exit::Failure;
 use crate::output;
 
 /// Whether a scene is a height raster, perhaps of several files, by its names.
 pub fn is_raster(scene: &[PathBuf]) -> bool {
-    scene.iter().all(|path| antumbra_raster::is_raster(path))
+    let is_raster = |path| antumbra_raster::is_raster(path) || is_index(path);
+    scene.iter().all(|path: &PathBuf| is_raster(path))
 }
 
 /// Writes values of sensors, which are the vertices of a height raster or the cells of a grid. A unit of the scene has so many

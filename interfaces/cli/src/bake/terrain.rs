@@ -1,16 +1,20 @@
 //! Height rasters that are baked without a mesh and without a tree.
 
-use std::path::PathBuf;
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use antumbra::LocalOrigin;
 use antumbra_bake::{HeightField, Sensors, UpAxis};
 use antumbra_lab::count;
 use antumbra_load::{Extent, Heights, MemorySize, raster_name};
-use antumbra_raster::{Crs, Grid, Site};
+use antumbra_raster::{Crs, Grid, Quantity, Raster, Site};
+use antumbra_terrain::{Tile, Tiles};
+use antumbra_tiles::Indexed;
 
-use super::raster::is_raster;
+use super::raster::{self, is_raster};
 use super::site::Asked;
+use super::tile::{self, is_index};
 use crate::exit::{Failure, tell};
 use crate::output::Files;
 use crate::scenes;
@@ -23,6 +27,8 @@ pub struct Terrain {
     /// Number of cells with data.
     pub known: usize,
     pub load_seconds: f64,
+    /// Cells whose values are written, if these are not all.
+    own: Option<Tile>,
 }
 
 /// Whether a scene is a height raster that lies as it does on a map.
@@ -35,6 +41,14 @@ impl Terrain {
     pub fn load(scene: &[PathBuf], memory: MemorySize, files: &mut Files) -> Result<Self, Failure> {
         let name = raster_name(scene);
         let start = Instant::now();
+        if let [index] = scene
+            && is_index(index)
+        {
+            let raster = tile::open(index, memory)?;
+            files.reads("the index", index)?;
+            let whole = raster.index().whole();
+            return Self::of_tile(&raster, &whole, name);
+        }
         let heights = scenes::load_heights(scene, memory)?;
         files.reads_all(&heights.inputs)?;
         let Some(extent) = heights.extent else {
@@ -47,7 +61,73 @@ impl Terrain {
             heights,
             extent,
             load_seconds: start.elapsed().as_secs_f64(),
+            own: None,
         })
+    }
+
+    /// Reads a tile of a raster with the cells around it. Place and extent are of the whole.
+    pub fn of_tile(raster: &Indexed, tile: &Tile, name: String) -> Result<Self, Failure> {
+        let start = Instant::now();
+        let index = raster.index();
+        let window = tile.with_margin([1; 2], &index.whole());
+        let values = raster.read(window)?;
+        let at = [0, 1].map(|axis| tile.at[axis] - window.at[axis]);
+        Ok(Self {
+            name,
+            known: values.iter().filter(|height| height.is_finite()).count(),
+            heights: Heights {
+                raster: Raster {
+                    grid: raster.grid(&window)?,
+                    values,
+                    height_factor: index.height_factor,
+                },
+                extent: None,
+                warnings: Vec::new(),
+                tiles: None,
+                inputs: Vec::new(),
+            },
+            extent: Extent {
+                low: index.low.into(),
+                high: index.high.into(),
+            },
+            load_seconds: start.elapsed().as_secs_f64(),
+            own: (*tile != window).then_some(Tile { at, ..*tile }),
+        })
+    }
+
+    /// Writes values of all cells, plane by plane; of a tile, those of its own cells.
+    pub fn write(
+        &self,
+        path: &Path,
+        crs: Option<&Crs>,
+        values: &[f32],
+        bands: &[Quantity<'_>],
+    ) -> Result<(), Failure> {
+        raster::write_values(path, &self.own_grid(crs), &self.own(values), bands)
+    }
+
+    /// Grid of the cells whose values are written.
+    pub fn own_grid(&self, crs: Option<&Crs>) -> Grid {
+        let mut grid = self.grid(crs);
+        if let Some(Tile { at, size }) = self.own {
+            let [x, y] = grid.corner(at[0] as f64, at[1] as f64);
+            (grid.transform[0], grid.transform[3]) = (x, y);
+            [grid.width, grid.height] = size;
+        }
+        grid
+    }
+
+    /// Values of these cells, of values of all, plane by plane.
+    pub fn own<'v>(&self, values: &'v [f32]) -> Cow<'v, [f32]> {
+        let Some(Tile { at, size }) = self.own else {
+            return values.into();
+        };
+        let grid = &self.heights.raster.grid;
+        let [column, row] = at.map(|at| at as usize);
+        let planes = values.chunks_exact(grid.width * grid.height);
+        let rows = planes.flat_map(|plane| plane.chunks_exact(grid.width).skip(row).take(size[1]));
+        let own = rows.flat_map(|row| &row[column..][..size[0]]);
+        own.copied().collect()
     }
 
     /// Settles what its coordinate system answers. Returns the place on the earth, if it is known.

@@ -21,9 +21,10 @@ use std::time::Instant;
 
 use antumbra::LocalOrigin;
 use antumbra_bake::{
-    FieldSunJob, Moment, Sensors, SkyDivision, SunFound, SunJob, Sunlight, Surroundings, UpAxis,
-    Weather,
+    FieldSunJob, Moment, Monitor, Sensors, SkyDivision, SunFound, SunJob, Sunlight, Surroundings,
+    UpAxis, Weather,
 };
+use antumbra_tiles::Indexed;
 use clap::{ArgGroup, Args};
 
 use super::command::{Bake, Baking, Done, Figure, Named};
@@ -34,6 +35,7 @@ use super::parts::By;
 use super::places::{self, Places};
 use super::site::Asked;
 use super::terrain::{Terrain, is_terrain};
+use super::tile::Tiling;
 use crate::args::{
     ChunkArgs, MapArgs, PlaceArgs, RasterArgs, SCENE, TimeArgs, heading, rasters_long,
     values as checked,
@@ -253,6 +255,18 @@ impl Baking for SunArgs {
         [written, read]
     }
 
+    fn tiling(&self, _: &Indexed) -> Result<Tiling, Failure> {
+        if !self.is_of_cells() || self.has_terrain_cells() {
+            let reason = "tiles of an index are for --cells of the index";
+            return Err(Failure::usage(reason));
+        }
+        let [name, unit] = self.show.name_and_unit();
+        Ok(Tiling {
+            directions: Vec::new(),
+            bands: vec![[name, unit].map(str::to_owned)],
+        })
+    }
+
     fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
         around::check(self)?;
         let begin = Instant::now();
@@ -401,9 +415,17 @@ impl SunArgs {
             sensors = terrain.sensors(rise);
             sensors.normals = job.normals();
         }
+        let lit = bake.tile.map(|work| {
+            move |directions: &[[f64; 2]], monitor: &dyn Monitor| {
+                work.lit(rise, directions, monitor)
+            }
+        });
+        if let Some(lit) = &lit {
+            job = job.lit_by(lit);
+        }
         let build_seconds = start.elapsed().as_secs_f64();
         let done = match &town {
-            _ if bake.is_whole() => self.whole(&job, &terrain.name)?,
+            _ if bake.is_whole() => self.whole(&job, (bake, &terrain.name))?,
             Some((ground, _)) => bake.compute(&job, ground, &ground.bvh)?,
             None => bake.compute_cells(&job, &terrain.name)?,
         };
@@ -430,12 +452,20 @@ impl SunArgs {
     }
 
     /// Computes all of a job with little memory.
-    fn whole(&self, job: &FieldSunJob<'_>, name: &str) -> Result<Done<SunFound>, Failure> {
+    fn whole(
+        &self,
+        job: &FieldSunJob<'_>,
+        (bake, name): (&Bake<'_>, &str),
+    ) -> Result<Done<SunFound>, Failure> {
         let keeps = self.writes(&["npz"]) || self.hourly.is_some() || self.frames.is_some();
         input::check_answers(name, job.memory(keeps))?;
         let (start, progress) = (Instant::now(), Progress::new(name));
         let found = job.whole(keeps, &progress);
         progress.finish();
+        let found = found.map_err(|error| match bake.tile {
+            Some(work) => work.failure(error),
+            None => error.into(),
+        });
         Ok(Done::whole(found?, start.elapsed().as_secs_f64()))
     }
 

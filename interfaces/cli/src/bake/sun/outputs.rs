@@ -31,7 +31,7 @@ impl Baked<'_> {
                 let quantity = Quantity { name, unit };
                 if let Some(terrain) = self.terrain {
                     let values = self.of_cells(values);
-                    return raster::write_values(path, &terrain.grid(crs), &values, &[quantity]);
+                    return terrain.write(path, crs, &values, &[quantity]);
                 }
                 let place = (crs, args.places.units.metres());
                 let (ground, _) = self.mesh()?;

@@ -27,6 +27,12 @@ impl Shown {
     pub fn needs_weather(self) -> bool {
         matches!(self, Direct | Diffuse | Total)
     }
+
+    /// Name and unit in files.
+    pub fn name_and_unit(self) -> [&'static str; 2] {
+        let row = ROWS.iter().find(|(shown, ..)| *shown == Some(self));
+        row.map_or(["", ""], |(_, [name, unit, _], _)| [name, unit])
+    }
 }
 
 /// A value of all sensors.

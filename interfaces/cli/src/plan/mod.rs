@@ -1,0 +1,279 @@
+//! Plans: jobs as text, of tasks that any engine can run.
+//!
+//! A task is a pure function of the plan, its line and the files that both name. It writes one file by renaming it, and then a receipt
+//! with its checksum. So a task that was lost is run again, one that is done is not, and two runs of one task do no harm.
+//!
+//! - `make`: `antumbra plan`;  `run`: `antumbra run`;  `check`: `antumbra check`;  `merge`: results as one file
+//! - `survey`: `antumbra index`;  `bill`: what a plan takes
+
+mod bill;
+mod check;
+mod make;
+mod merge;
+mod run;
+mod survey;
+
+use std::fs::{self, File};
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::{Xxh3, xxh3_64};
+
+use crate::exit::Failure;
+
+pub use check::check;
+pub use make::make;
+pub use merge::{is_plan, merge};
+pub use run::run;
+pub use survey::survey;
+
+const PLAN: &str = "antumbra.plan/1";
+const RECEIPT: &str = "antumbra.receipt/1";
+
+/// The first line of a plan.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Head {
+    schema: String,
+    /// The scene or the index; relative to the folder of the plan if it is in it.
+    scene: PathBuf,
+    /// The command of all tasks, without its scene and its output.
+    command: Vec<String>,
+    /// Folder of results and receipts, as `scene`.
+    folder: PathBuf,
+    /// Name and unit of each band of the tiles.
+    bands: Vec<[String; 2]>,
+    /// Numbers of tasks that only need those before: so many first, so many next, and so on.
+    levels: Vec<usize>,
+    bill: Bill,
+}
+
+/// What a plan takes, all tasks together.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Bill {
+    pub tasks: usize,
+    /// Cells whose results are written; 0 of scenes that are no rasters.
+    pub cells: u64,
+    /// Hours of one core.
+    pub core_hours: Option<f64>,
+    /// Most memory of a task in bytes.
+    pub memory: Option<u64>,
+    /// Bytes of the files that tasks begin with, once for each task, and of results.
+    pub bytes_read: u64,
+    pub bytes_written: u64,
+}
+
+/// A task: a line of a plan.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Task {
+    id: String,
+    /// What it computes.
+    #[serde(flatten)]
+    part: Part,
+    /// Tasks whose results it needs.
+    after: Vec<String>,
+    /// Files that it certainly reads. Receipts name those that it did read.
+    inputs: Vec<Input>,
+    /// Its file in the folder.
+    output: String,
+    /// Estimates for one core.
+    seconds: Option<f64>,
+    memory: Option<u64>,
+}
+
+/// What a task computes.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Part {
+    /// Cells of a raster: column, row, columns and rows.
+    Tile([usize; 4]),
+    /// Sweeps of a quarter of the steps over the same.
+    Sweep { tile: [usize; 4], quarter: usize },
+    /// One of some shares of the work.
+    Shard([u32; 2]),
+}
+
+/// A file and its checksum: XXH3, 64 bits, hexadecimal.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct Input {
+    path: PathBuf,
+    xxh3: String,
+}
+
+/// What a task has done.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Receipt {
+    schema: String,
+    task: String,
+    /// Checksum of what the result is made of.
+    key: String,
+    output: Input,
+    bytes: u64,
+    inputs: Vec<Input>,
+    seconds: f64,
+    version: String,
+}
+
+/// A plan that was read.
+pub struct Plan {
+    path: PathBuf,
+    head: Head,
+    tasks: Vec<Task>,
+}
+
+/// What there is of a task.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+enum State {
+    /// Its result and its receipt are there and agree.
+    Done,
+    /// There is no receipt, or none that can be read.
+    Missing,
+    /// The receipt is of another plan, or of other inputs.
+    Stale,
+    /// The result is not as the receipt says.
+    Disagreeing,
+}
+
+impl Plan {
+    /// Reads a plan; with names of tasks or their numbers only these.
+    fn read(path: &Path, wanted: &[String]) -> Result<Self, Failure> {
+        let bad = |line: usize, reason: String| {
+            Failure::Data(format!("{}:{}: {reason}", path.display(), line + 1))
+        };
+        let file = File::open(path);
+        let file = file.map_err(|error| Failure::Usage(format!("{}: {error}", path.display())))?;
+        let mut lines = BufReader::new(file).lines().enumerate();
+        let first = lines
+            .next()
+            .and_then(|(_, line)| line.ok())
+            .unwrap_or_default();
+        let head: Head = serde_json::from_str(&first)
+            .map_err(|error| bad(0, format!("wanted a plan of `antumbra plan`: {error}")))?;
+        if head.schema != PLAN {
+            return Err(bad(
+                0,
+                format!("found the schema `{}`, wanted {PLAN}", head.schema),
+            ));
+        }
+        let mut tasks = Vec::new();
+        let starts: Vec<String> = wanted
+            .iter()
+            .map(|id| format!("{{\"id\":\"{id}\","))
+            .collect();
+        let mut count = 0;
+        for (number, line) in lines {
+            let line = line.map_err(|error| bad(number, error.to_string()))?;
+            count += 1;
+            // Other lines need not be understood, since there may be many of them.
+            let is_wanted = |(id, start): (&String, &String)| {
+                line.starts_with(start) || id.parse() == Ok(number - 1)
+            };
+            if wanted.is_empty() || wanted.iter().zip(&starts).any(is_wanted) {
+                let task = serde_json::from_str(&line);
+                tasks.push(task.map_err(|error| bad(number, error.to_string()))?);
+            }
+        }
+        if count != head.bill.tasks {
+            let reason = format!(
+                "found {count} tasks, wanted {}; it is cut short",
+                head.bill.tasks
+            );
+            return Err(bad(count, reason));
+        }
+        let path = path.to_path_buf();
+        let plan = Self { path, head, tasks };
+        let is_there = |id: &&String| {
+            let mut tasks = plan.tasks.iter();
+            id.parse::<usize>().is_ok_and(|number| number < count)
+                || tasks.any(|task| task.id == **id)
+        };
+        match wanted.iter().find(|id| !is_there(id)) {
+            None => Ok(plan),
+            Some(id) => Err(Failure::Usage(format!(
+                "{}: there is no task {id}; tasks have the numbers 0 to {}, and ids in each line",
+                plan.path.display(),
+                count.saturating_sub(1)
+            ))),
+        }
+    }
+
+    /// A file beside the plan.
+    fn beside(&self, path: &Path) -> PathBuf {
+        self.path.parent().unwrap_or(Path::new("")).join(path)
+    }
+
+    /// Folder of results.
+    fn folder(&self) -> PathBuf {
+        self.beside(&self.head.folder)
+    }
+
+    /// The result of a task.
+    fn result(&self, task: &Task) -> PathBuf {
+        self.folder().join(&task.output)
+    }
+
+    fn receipt_path(&self, id: &str) -> PathBuf {
+        self.folder().join(format!("{id}.receipt.json"))
+    }
+
+    /// The receipt of a task, if there is one.
+    fn receipt(&self, id: &str) -> Option<Receipt> {
+        let text = fs::read_to_string(self.receipt_path(id)).ok()?;
+        let receipt: Receipt = serde_json::from_str(&text).ok()?;
+        (receipt.schema == RECEIPT && receipt.task == id).then_some(receipt)
+    }
+
+    /// The command line of all tasks, without an output.
+    fn command(&self) -> Vec<String> {
+        let (name, flags) = self
+            .head
+            .command
+            .split_first()
+            .map_or(("", &[][..]), |(name, flags)| (&**name, flags));
+        let scene = self.beside(&self.head.scene).to_string_lossy().into_owned();
+        let line = ["antumbra".to_owned(), name.to_owned(), scene];
+        line.into_iter().chain(flags.iter().cloned()).collect()
+    }
+
+    /// A number that changes with all that the result of a task is made of.
+    fn key(&self, task: &Task) -> Result<String, Failure> {
+        let of = (&self.head.command, &task.part, &task.after, &task.inputs);
+        let text = serde_json::to_string(&of).map_err(Failure::work)?;
+        Ok(sum_text(xxh3_64(text.as_bytes())))
+    }
+
+    /// What there is of a task.
+    fn state(&self, task: &Task) -> Result<State, Failure> {
+        let Some(receipt) = self.receipt(&task.id) else {
+            return Ok(State::Missing);
+        };
+        if receipt.key != self.key(task)? {
+            return Ok(State::Stale);
+        }
+        Ok(match checksum(&self.result(task)) {
+            Ok(found) if found == (receipt.bytes, receipt.output.xxh3) => State::Done,
+            _ => State::Disagreeing,
+        })
+    }
+}
+
+/// A checksum as text.
+fn sum_text(sum: u64) -> String {
+    format!("{sum:016x}")
+}
+
+/// Length and checksum of a file.
+fn checksum(path: &Path) -> Result<(u64, String), Failure> {
+    let failed = |error| Failure::Work(format!("{}: {error}", path.display()));
+    let mut file = antumbra_files::open(path).map_err(failed)?;
+    let (mut sum, mut bytes, mut total) = (Xxh3::new(), vec![0; 1 << 16], 0);
+    loop {
+        let count = file.read(&mut bytes).map_err(failed)?;
+        if count == 0 {
+            return Ok((total, sum_text(sum.digest())));
+        }
+        sum.update(&bytes[..count]);
+        total += count as u64;
+    }
+}
