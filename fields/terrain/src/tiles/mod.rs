@@ -58,6 +58,13 @@ impl Tile {
         Self::between(at, [0, 1].map(|axis| ends[axis].min(others[axis])))
     }
 
+    /// The smallest rectangle around both.
+    pub fn hull(&self, other: &Self) -> Self {
+        let (ends, others) = (self.end(), other.end());
+        let at = [0, 1].map(|axis| self.at[axis].min(other.at[axis]));
+        Self::between(at, [0, 1].map(|axis| ends[axis].max(others[axis])))
+    }
+
     /// Whether they have a common cell.
     pub fn touches(&self, other: &Self) -> bool {
         self.within(other).cells() > 0

@@ -23,7 +23,7 @@ use super::places::{self, Places};
 use super::raster;
 use super::site::Asked;
 use super::terrain::is_terrain;
-use super::tile::Tiling;
+use super::tile::{self, Tiling};
 use crate::args::{
     ChunkArgs, MapArgs, PlaceArgs, RasterArgs, SCENE, heading, rasters_long, values,
 };
@@ -240,10 +240,7 @@ impl Baking for HorizonArgs {
         let index = raster.index();
         // Where no azimuth follows from the place, a plan can do without the files.
         if matches!(self.azimuths(), Azimuths::Even(_)) {
-            let grid = raster.grid(&index.whole())?;
-            let middle = [0, 1, 2].map(|axis| 0.5 * (index.low[axis] + index.high[axis]));
-            let asked = Asked::new(&self.raster, &self.places);
-            asked.settle("index", grid.crs.as_ref(), middle)?;
+            tile::settle(raster, &Asked::new(&self.raster, &self.places))?;
         }
         let field = HeightField::new([2, 2], &[0.0; 4], index.transform);
         let (azimuths, directions) = self.directions(&field.map_err(Error::from)?)?;

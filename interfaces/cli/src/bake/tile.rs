@@ -11,12 +11,14 @@ use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use antumbra_bake::{Direction, Error, HeightField};
+use antumbra_bake::{Direction, Error, HeightField, Limits, Observer};
 use antumbra_image::atomic_write;
 use antumbra_load::MemorySize;
 use antumbra_terrain::{Border, Monitor, Pull, Share, Sweep, Tile, TileSweep, Tiles, degrees};
 use antumbra_tiles::{self as tiles, Indexed};
+use glam::DVec3;
 
+use super::site::Asked;
 use crate::exit::Failure;
 use crate::output::is_one_of;
 
@@ -34,6 +36,15 @@ pub fn is_index(path: &Path) -> bool {
 /// Opens the raster of an index.
 pub fn open(index: &Path, memory: MemorySize) -> Result<Indexed, Failure> {
     Ok(Indexed::open(index, memory.bytes() / KEPT)?)
+}
+
+/// Settles north and units as of the whole raster.
+pub fn settle(raster: &Indexed, asked: &Asked<'_>) -> Result<(), Failure> {
+    let index = raster.index();
+    let grid = raster.grid(&index.whole())?;
+    let middle = DVec3::from(index.low).midpoint(index.high.into());
+    asked.settle("index", grid.crs.as_ref(), middle.to_array())?;
+    Ok(())
 }
 
 /// How tiles of a raster are computed.
@@ -90,6 +101,61 @@ impl<'a> TileWork<'a> {
     /// The tile with the cells around it.
     fn window(&self) -> Tile {
         self.tile.with_margin([1; 2], &self.raster.index().whole())
+    }
+
+    /// An observer at a point, in columns and rows of the whole; on the surface if the point has no height. `None` beside the surface.
+    pub fn observer(raster: &Indexed, [x, y, z]: [f64; 3]) -> Result<Option<Observer>, Failure> {
+        let index = raster.index();
+        let whole = HeightField::new([2, 2], &[0.0; 4], index.transform).map_err(Error::from)?;
+        let place = whole.place([x, y]);
+        let around = around(place).within(&index.whole());
+        if around.size.contains(&0) {
+            return Ok(None);
+        }
+        let heights = raster.read(around)?;
+        let field = HeightField::new(around.size, &heights, index.transform);
+        let field = field.map_err(Error::from)?;
+        let own = [0, 1].map(|axis| place[axis] - around.at[axis] as f64);
+        let height = if z.is_nan() {
+            field.surface(own)
+        } else {
+            Some(z)
+        };
+        Ok(height.map(|height| Observer {
+            place,
+            height,
+            normal: [0.0; 3],
+        }))
+    }
+
+    /// Answers with a field that has the window and all cells between it and an observer, who is moved into it, and with the window in
+    /// it; not at all if every cell is out of range.
+    pub fn seen(
+        &self,
+        observer: &Observer,
+        limits: &Limits,
+        answer: impl FnOnce(&HeightField<'_>, &Observer, Tile) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let (index, window) = (self.raster.index(), self.window());
+        let [_, a, b, _, d, e] = index.transform;
+        let ends = [0, 1].map(|axis| {
+            let first = window.at[axis] as f64 - observer.place[axis];
+            [first, first + window.size[axis] as f64]
+        });
+        // Cells beyond the nearest corner are as far away, along columns or rows.
+        let away = ends.map(|[first, last]| first.max(-last).max(0.0));
+        let least = (a * e - b * d).abs() / a.hypot(d).max(b.hypot(e));
+        if away[0].max(away[1]) * least > limits.range {
+            return Ok(());
+        }
+        let eye = around(observer.place).within(&index.whole());
+        let hull = window.hull(&eye);
+        let heights = self.raster.read(hull)?;
+        let field = HeightField::new(hull.size, &heights, index.transform_at(hull.at));
+        let place = [0, 1].map(|axis| observer.place[axis] - hull.at[axis] as f64);
+        let at = [0, 1].map(|axis| window.at[axis] - hull.at[axis]);
+        let eye = Observer { place, ..*observer };
+        answer(&field.map_err(Error::from)?, &eye, Tile { at, ..window })
     }
 
     /// Which of the cells of the window get light from each of some directions, as [`FieldSunJob`](antumbra_bake::FieldSunJob) asks.
@@ -205,6 +271,14 @@ impl<'a> TileWork<'a> {
             all[column..][..values.len()].copy_from_slice(values);
         }
         all
+    }
+}
+
+/// The cells around a place.
+fn around(place: [f64; 2]) -> Tile {
+    Tile {
+        at: place.map(|at| at.floor() as i64 - 1),
+        size: [4; 2],
     }
 }
 

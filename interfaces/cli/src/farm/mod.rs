@@ -70,7 +70,7 @@ impl Plan {
                 if !more.is_empty() {
                     return Err(Failure::usage("--output: render writes one image"));
                 }
-                check_flags(args)?;
+                check_flags(&args.flags)?;
             }
             _ => check_bake(args)?,
         }
@@ -246,9 +246,9 @@ fn no_lines() -> Failure {
 }
 
 /// Refuses flags that `render` does not know, before a hundred machines do, and those that are ours to set.
-fn check_flags(args: &FarmArgs) -> Result<(), Failure> {
+pub fn check_flags(flags: &[String]) -> Result<(), Failure> {
     let line = ["antumbra", "render", "scene.pbrt"].map(Into::into);
-    let line = line.into_iter().chain(args.flags.iter().cloned());
+    let line = line.into_iter().chain(flags.iter().cloned());
     let cli = Cli::try_parse_from(line).map_err(|error| Failure::Usage(error.to_string()))?;
     let Some(Command::Render(render)) = cli.command else {
         return Err(Failure::Usage("flags after -- belong to render".into()));
@@ -263,7 +263,7 @@ fn check_flags(args: &FarmArgs) -> Result<(), Failure> {
     ];
     match ours.iter().find(|(_, given)| *given) {
         Some((flag, _)) => Err(Failure::Usage(format!(
-            "{flag} is set for every task by farm itself"
+            "{flag} cannot be a flag of every task, which has its own"
         ))),
         None => Ok(()),
     }

@@ -1,20 +1,23 @@
 //! What a plan takes: measured on a part of its own raster, before anything is run.
 
-use std::time::Instant;
-
 use antumbra_bake::{Direction, Error, FieldHorizonJob, HeightField};
+use antumbra_lab::thread_seconds;
 use antumbra_load::MemorySize;
 use antumbra_terrain::{Tile, Tiles};
 use antumbra_tiles::Indexed;
 
 use super::run::PART;
-use crate::args::start_threads;
 use crate::bake::tile::TileWork;
 use crate::bake::{BakeCommand, run_tile};
 use crate::exit::{Failure, Loudness, quietly};
 
-/// Cells on a side of the part that is measured.
+/// Cells on a side of the squares that are measured, and seconds that the larger one may take.
+const SMALL: usize = 96;
 const SAMPLE: usize = 512;
+const LONG: f64 = 2.0;
+
+/// Seconds to write and to read a number, about.
+const WRITTEN: f64 = 2e-8;
 
 /// Bytes of a program that has read nothing.
 const PROGRAM: u64 = 40 << 20;
@@ -22,75 +25,51 @@ const PROGRAM: u64 = 40 << 20;
 /// Bytes of heights and of what is made of them, for each cell of a tile.
 const CELL: u64 = 96;
 
-/// Seconds of one core for a cell; `None` where the files of the raster are not here.
+/// Seconds of one core for each cell; `None` where files of the raster are not here.
 pub struct Rates {
     sweep: Option<f64>,
-    tile: Option<f64>,
+    /// For each cell of a tile, and for each one along its border.
+    tile: Option<[f64; 2]>,
     planes: usize,
 }
 
-/// Measures a command on the middle of a raster. `line` has its output.
-pub fn rates(
-    bake: &BakeCommand,
-    raster: &Indexed,
-    directions: &[Direction],
-    memory: MemorySize,
-) -> Result<Rates, Failure> {
-    let none = Rates {
-        sweep: None,
-        tile: None,
-        planes: directions.len(),
-    };
-    let index = raster.index();
-    if index.files.iter().any(|file| !file.path.is_file()) {
-        return Ok(none);
-    }
-    start_threads(None)?;
-    let threads = rayon::current_num_threads() as f64;
-    // The middle of the file in the middle, which has data.
-    let middle = &index.files[index.files.len() / 2];
-    let size = middle.size.map(|cells| cells.min(SAMPLE));
-    let at = [0, 1].map(|axis| (middle.at[axis] + (middle.size[axis] - size[axis]) / 2) as i64);
-    let sample = Tile { at, size };
-    let cells = (size[0] * size[1]) as f64;
-    let step = |direction: &&Direction| matches!(direction, Direction::Step(_));
-    let steps = directions.iter().filter(step).count();
-    if steps == 0 {
-        let work = TileWork::new(raster, sample, (None, &[]));
-        let start = Instant::now();
-        quietly(Loudness::Quiet, || run_tile(bake.args().0, memory, &work))?;
-        let seconds = start.elapsed().as_secs_f64() * threads;
-        return Ok(Rates {
-            tile: Some(seconds / cells),
-            ..none
-        });
-    }
-    let heights = raster.read(sample)?;
-    let field = HeightField::new(size, &heights, index.transform_at(at)).map_err(Error::from)?;
-    let job = FieldHorizonJob::new(&field, directions, 0.0, 0.0)?;
-    let time = |wanted: bool| {
-        let find = |direction: &Direction| matches!(direction, Direction::Step(_)) == wanted;
-        let Some(index) = directions.iter().position(find) else {
-            return Ok(0.0);
-        };
-        let start = Instant::now();
-        job.plane(index, &())?;
-        Ok::<f64, Error>(start.elapsed().as_secs_f64() * threads / cells)
-    };
-    // Once more, since the first one meets cold caches.
-    let (_, sweep, azimuth) = (time(true)?, time(true)?, time(false)?);
-    let tile = (directions.len() - steps) as f64 * azimuth + directions.len() as f64 * WRITTEN;
-    Ok(Rates {
-        sweep: Some(sweep + WRITTEN),
-        tile: Some(tile),
-        ..none
-    })
-}
-
-/// Seconds to write and to read a number, about.
-const WRITTEN: f64 = 2e-8;
-
 impl Rates {
+    /// Measures a command on the middle of a raster.
+    pub fn measure(
+        bake: &BakeCommand,
+        raster: &Indexed,
+        directions: &[Direction],
+        memory: MemorySize,
+    ) -> Result<Self, Failure> {
+        let mut rates = Self {
+            sweep: None,
+            tile: None,
+            planes: directions.len(),
+        };
+        if raster.index().files.iter().any(|file| !file.path.is_file()) {
+            return Ok(rates);
+        }
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        one.map_err(Failure::work)?
+            .install(|| {
+                let is_step = |direction: &Direction| matches!(direction, Direction::Step(_));
+                let swept = directions
+                    .iter()
+                    .filter(|direction| is_step(direction))
+                    .count();
+                if swept == 0 {
+                    rates.tile = Some(of_tile(bake, raster, memory)?);
+                    return Ok(());
+                }
+                let (sweep, azimuth) = of_directions(raster, directions)?;
+                rates.sweep = Some(sweep + WRITTEN);
+                let pulled = (directions.len() - swept) as f64 * azimuth;
+                rates.tile = Some([pulled + directions.len() as f64 * WRITTEN, 0.0]);
+                Ok(())
+            })
+            .map(|()| rates)
+    }
+
     /// Seconds of a sweep.
     pub fn sweep(&self, tile: &Tile, steps: usize) -> Option<f64> {
         self.sweep
@@ -99,8 +78,9 @@ impl Rates {
 
     /// Seconds of a tile.
     pub fn tile(&self, tile: &Tile) -> Option<f64> {
+        let [columns, rows] = tile.size.map(|cells| cells as f64);
         self.tile
-            .map(|rate| rate * (tile.size[0] * tile.size[1]) as f64)
+            .map(|[cell, border]| cell * columns * rows + border * 2.0 * (columns + rows))
     }
 
     /// Most bytes of memory of a tile.
@@ -115,6 +95,67 @@ impl Rates {
         };
         PROGRAM + CELL * cells + 8 * columns * rows
     }
+}
+
+/// A square in the middle of the file in the middle, which has data.
+fn sample(raster: &Indexed, side: usize) -> Tile {
+    let files = &raster.index().files;
+    let middle = &files[files.len() / 2];
+    let size = middle.size.map(|cells| cells.min(side));
+    Tile {
+        at: [0, 1].map(|axis| (middle.at[axis] + (middle.size[axis] - size[axis]) / 2) as i64),
+        size,
+    }
+}
+
+/// Seconds for each cell, and for each one along the border, by two squares.
+fn of_tile(bake: &BakeCommand, raster: &Indexed, memory: MemorySize) -> Result<[f64; 2], Failure> {
+    let measure = |side: usize| {
+        let tile = sample(raster, side);
+        let work = TileWork::new(raster, tile, (None, &[]));
+        let start = thread_seconds();
+        quietly(Loudness::Quiet, || run_tile(bake.args().0, memory, &work))?;
+        let [columns, rows] = tile.size.map(|cells| cells as f64);
+        Ok::<_, Failure>((
+            thread_seconds() - start,
+            columns * rows,
+            2.0 * (columns + rows),
+        ))
+    };
+    // What is only read once is read before.
+    measure(SMALL)?;
+    let (first, cells, border) = measure(SMALL)?;
+    let side = SMALL as f64 * (LONG / first.max(1e-6)).sqrt();
+    let (second, more, longer) = measure(side.clamp(2.0 * SMALL as f64, SAMPLE as f64) as usize)?;
+    let area = cells * longer - more * border;
+    // Of files that are no larger than the small square there is one measure only.
+    if area.abs() < 1.0 {
+        return Ok([second / more, 0.0]);
+    }
+    let cell = (first * longer - second * border) / area;
+    let cell = cell.clamp(0.0, second / more);
+    Ok([cell, ((second - cell * more) / longer).max(0.0)])
+}
+
+/// Seconds for each cell of a sweep, and of an azimuth that is pulled.
+fn of_directions(raster: &Indexed, directions: &[Direction]) -> Result<(f64, f64), Failure> {
+    let tile = sample(raster, SAMPLE);
+    let heights = raster.read(tile)?;
+    let transform = raster.index().transform_at(tile.at);
+    let field = HeightField::new(tile.size, &heights, transform).map_err(Error::from)?;
+    let job = FieldHorizonJob::new(&field, directions, 0.0, 0.0)?;
+    let measure = |is_step: bool| {
+        let find = |direction: &Direction| matches!(direction, Direction::Step(_)) == is_step;
+        let Some(index) = directions.iter().position(find) else {
+            return Ok(0.0);
+        };
+        let start = thread_seconds();
+        job.plane(index, &())?;
+        Ok::<f64, Error>((thread_seconds() - start) / heights.len() as f64)
+    };
+    // The first one finds caches cold.
+    measure(true)?;
+    Ok((measure(true)?, measure(false)?))
 }
 
 /// Most bytes of memory of a sweep.

@@ -1,19 +1,22 @@
 //! `antumbra plan`: the tasks of a job.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
 use antumbra_terrain::Tile;
+use antumbra_tiles::Index;
 use clap::Parser;
 
-use super::{Bill, Head, Input, PLAN, Part, Task, bill, checksum, sum_text};
+use super::bill::{self, Rates};
+use super::{Bill, Head, Input, PLAN, Part, Task, checksum, sum_text};
 use crate::args::{Cli, Command, PlanArgs};
 use crate::bake::BakeCommand;
 use crate::bake::tile::{self, Tiling, is_index};
 use crate::exit::{Failure, tell};
+use crate::farm::check_flags;
 use crate::output::{Files, beside, text};
 use crate::{interrupt, json};
 
@@ -165,7 +168,10 @@ fn settle_files(bake: &BakeCommand, command: &mut [String]) -> Result<Vec<Input>
 fn of_shards(args: &PlanArgs, head: &mut Head) -> Result<Vec<Task>, Failure> {
     let command = parse(line(args), &["-o", "0.part", "--shard", "0/1"])?;
     let mut inputs = match &command {
-        Command::Render(_) => Vec::new(),
+        Command::Render(_) => {
+            check_flags(args.command.get(1..).unwrap_or_default())?;
+            Vec::new()
+        }
         Command::Bake(bake) => settle_files(bake, &mut head.command)?,
         _ => {
             return Err(Failure::usage(
@@ -199,110 +205,168 @@ fn of_shards(args: &PlanArgs, head: &mut Head) -> Result<Vec<Task>, Failure> {
     Ok((0..args.tasks).map(task).collect())
 }
 
+/// Squares of a raster, and what they are made of.
+struct Squares<'a> {
+    side: usize,
+    size: [usize; 2],
+    /// Numbers of squares across and down.
+    counts: [usize; 2],
+    /// What all tasks read.
+    common: Vec<Input>,
+    /// Files that a square touches, and their bytes.
+    files: HashMap<[usize; 2], (Vec<Input>, u64)>,
+    rates: &'a Rates,
+}
+
+/// Least number of columns or rows of a square beside another one.
+const LEAST: usize = 16;
+
+impl<'a> Squares<'a> {
+    fn new(
+        args: &PlanArgs,
+        index: &Index,
+        common: Vec<Input>,
+        rates: &'a Rates,
+    ) -> Result<Self, Failure> {
+        let (side, size) = (args.tile as usize, [index.columns, index.rows]);
+        // What is left over goes to the last square if it is small.
+        let count = |cells: usize| {
+            cells.div_ceil(side) - usize::from(cells > side && (1..LEAST).contains(&(cells % side)))
+        };
+        let mut squares = Self {
+            side,
+            size,
+            counts: size.map(count),
+            common,
+            files: HashMap::new(),
+            rates,
+        };
+        for file in &index.files {
+            let [last_column, last_row] =
+                [0, 1].map(|axis| squares.at(axis, file.at[axis] + file.size[axis] - 1));
+            for row in squares.at(1, file.at[1])..=last_row {
+                for column in squares.at(0, file.at[0])..=last_column {
+                    let path = from(&args.output, &file.path)?;
+                    let xxh3 = sum_text(file.xxh3);
+                    let (files, bytes) = squares.files.entry([column, row]).or_default();
+                    files.push(Input { path, xxh3 });
+                    *bytes += file.bytes;
+                }
+            }
+        }
+        Ok(squares)
+    }
+
+    /// Column or row of the square with a column or row of cells.
+    fn at(&self, axis: usize, cell: usize) -> usize {
+        (cell / self.side).min(self.counts[axis] - 1)
+    }
+
+    /// All squares, row by row.
+    fn places(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
+        near([0, 0], self.counts.map(|count| count.saturating_sub(1)))
+    }
+
+    fn tile(&self, place: [usize; 2]) -> Tile {
+        let cells = |axis: usize| match place[axis] + 1 == self.counts[axis] {
+            true => self.size[axis] - place[axis] * self.side,
+            false => self.side,
+        };
+        Tile {
+            at: place.map(|place| (place * self.side) as i64),
+            size: [cells(0), cells(1)],
+        }
+    }
+
+    fn inputs(&self, place: [usize; 2]) -> Vec<Input> {
+        let own = self.files.get(&place).map(|(files, _)| files);
+        self.common
+            .iter()
+            .chain(own.into_iter().flatten())
+            .cloned()
+            .collect()
+    }
+
+    /// The sweep of a quarter of the steps over a square.
+    fn sweep(&self, place: [usize; 2], (quarter, steps): &(usize, Vec<[i32; 2]>)) -> Task {
+        let (own, name) = (self.tile(place), format!("{}q{quarter}", id(place)));
+        let least = place.map(|at| at.saturating_sub(1));
+        let most = [0, 1].map(|axis| (place[axis] + 1).min(self.counts[axis] - 1));
+        let near: Vec<[usize; 2]> = near(least, most).collect();
+        let tiles: Vec<Tile> = near.iter().map(|&place| self.tile(place)).collect();
+        let ahead = steps.iter().flat_map(|step| own.ahead(*step, &tiles));
+        let after: BTreeSet<String> = ahead
+            .map(|at| format!("{}q{quarter}", id(near[at])))
+            .collect();
+        Task {
+            output: format!("{name}.sweep"),
+            id: name,
+            part: Part::Sweep {
+                tile: corners(own),
+                quarter: *quarter,
+            },
+            after: after.into_iter().collect(),
+            inputs: self.inputs(place),
+            seconds: self.rates.sweep(&own, steps.len()),
+            memory: Some(bill::memory_of_sweep(&own, steps.len())),
+        }
+    }
+
+    /// How many other squares lines of a quarter have passed, at most.
+    fn level(&self, place: [usize; 2], steps: &[[i32; 2]]) -> usize {
+        let passed = |axis: usize| match steps.iter().any(|step| step[axis] > 0) {
+            true => self.counts[axis] - 1 - place[axis],
+            false => place[axis],
+        };
+        passed(0) + passed(1)
+    }
+}
+
+/// Columns and rows between two of them, both included, row by row.
+fn near(least: [usize; 2], most: [usize; 2]) -> impl Iterator<Item = [usize; 2]> {
+    let rows = least[1]..=most[1];
+    rows.flat_map(move |row| (least[0]..=most[0]).map(move |column| [column, row]))
+}
+
+fn id([column, row]: [usize; 2]) -> String {
+    format!("r{row:04}c{column:04}")
+}
+
+fn corners(Tile { at, size }: Tile) -> [usize; 4] {
+    [at[0] as usize, at[1] as usize, size[0], size[1]]
+}
+
 /// Tiles of a raster.
 fn of_tiles(args: &PlanArgs, memory: MemorySize, head: &mut Head) -> Result<Vec<Task>, Failure> {
     let Command::Bake(bake) = parse(line(args), &["-o", "tile.tif"])? else {
-        return Err(Failure::usage(
-            "tiles of an index are for horizon and sun with --cells",
-        ));
+        let reason =
+            "tiles of an index are for horizon and sun with --cells, and visible --viewshed";
+        return Err(Failure::usage(reason));
     };
-    let mut more = settle_files(&bake, &mut head.command)?;
+    let mut common = settle_files(&bake, &mut head.command)?;
     bake.args().0.check()?;
     let raster = tile::open(&args.scene, memory)?;
-    let index = raster.index();
     let Tiling { directions, bands } = bake.args().0.tiling(&raster)?;
-    head.bands = bands;
     let (_, xxh3) = checksum(&args.scene)?;
-    more.insert(
-        0,
-        Input {
-            path: head.scene.clone(),
-            xxh3,
-        },
-    );
-    let side = args.tile as usize;
-    let [across, down] = [index.columns, index.rows].map(|cells| cells.div_ceil(side));
-    let tile = |[column, row]: [usize; 2]| Tile {
-        at: [(column * side) as i64, (row * side) as i64],
-        size: [
-            side.min(index.columns - column * side),
-            side.min(index.rows - row * side),
-        ],
-    };
-    let id = |[column, row]: [usize; 2]| format!("r{row:04}c{column:04}");
-    // Files by the tiles that they touch.
-    let mut touching: HashMap<[usize; 2], Vec<Input>> = HashMap::new();
-    let mut bytes_of: HashMap<[usize; 2], u64> = HashMap::new();
-    for file in &index.files {
-        let ends = [0, 1].map(|axis| (file.at[axis] + file.size[axis] - 1) / side);
-        for row in file.at[1] / side..=ends[1] {
-            for column in file.at[0] / side..=ends[0] {
-                let input = Input {
-                    path: from(&args.output, &file.path)?,
-                    xxh3: sum_text(file.xxh3),
-                };
-                touching.entry([column, row]).or_default().push(input);
-                *bytes_of.entry([column, row]).or_default() += file.bytes;
-            }
-        }
-    }
-    let places: Vec<[usize; 2]> = (0..down)
-        .flat_map(|row| (0..across).map(move |column| [column, row]))
-        .collect();
-    let corners = |Tile { at, size }: Tile| [at[0] as usize, at[1] as usize, size[0], size[1]];
-    let inputs = |place: &[usize; 2]| {
-        let own = touching.get(place).into_iter().flatten().cloned();
-        more.iter().cloned().chain(own).collect::<Vec<Input>>()
-    };
-    let rates = bill::rates(&bake, &raster, &directions, memory)?;
-    let mut tasks = Vec::new();
+    let path = head.scene.clone();
+    common.insert(0, Input { path, xxh3 });
+    let rates = Rates::measure(&bake, &raster, &directions, memory)?;
+    let squares = Squares::new(args, raster.index(), common, &rates)?;
     let quarters = tile::quarters(&directions);
-    for level in 0..across + down - 1 {
-        let before = tasks.len();
-        for (quarter, steps) in &quarters {
-            for place in &places {
-                let own = tile(*place);
-                // Columns and rows to the corner at which lines of the quarter begin.
-                let from = |axis: usize, count: usize| match steps.iter().any(|step| step[axis] > 0)
-                {
-                    true => count - 1 - place[axis],
-                    false => place[axis],
-                };
-                if from(0, across) + from(1, down) != level {
-                    continue;
-                }
-                let near: Vec<[usize; 2]> = neighbours(*place, [across, down]).collect();
-                let tiles: Vec<Tile> = near.iter().map(|place| tile(*place)).collect();
-                let ahead: HashSet<usize> = steps
-                    .iter()
-                    .flat_map(|step| own.ahead(*step, &tiles))
-                    .collect();
-                let mut after: Vec<String> = ahead
-                    .into_iter()
-                    .map(|at| format!("{}q{quarter}", id(near[at])))
-                    .collect();
-                after.sort();
-                let name = format!("{}q{quarter}", id(*place));
-                tasks.push(Task {
-                    output: format!("{name}.sweep"),
-                    id: name,
-                    part: Part::Sweep {
-                        tile: corners(own),
-                        quarter: *quarter,
-                    },
-                    after,
-                    inputs: inputs(place),
-                    seconds: rates.sweep(&own, steps.len()),
-                    memory: Some(bill::memory_of_sweep(&own, steps.len())),
-                });
-            }
+    let mut levels: BTreeMap<usize, Vec<Task>> = BTreeMap::new();
+    for quarter in &quarters {
+        for place in squares.places() {
+            let level = levels.entry(squares.level(place, &quarter.1)).or_default();
+            level.push(squares.sweep(place, quarter));
         }
-        head.levels.push(tasks.len() - before);
     }
-    let before = tasks.len();
-    for place in places.iter().filter(|place| touching.contains_key(*place)) {
-        let (own, name) = (tile(*place), id(*place));
-        tasks.push(Task {
+    let mut last = Vec::new();
+    for place in squares.places() {
+        let Some((_, bytes)) = squares.files.get(&place) else {
+            continue;
+        };
+        let (own, name) = (squares.tile(place), id(place));
+        last.push(Task {
             output: format!("{name}.tif"),
             part: Part::Tile(corners(own)),
             after: quarters
@@ -310,27 +374,17 @@ fn of_tiles(args: &PlanArgs, memory: MemorySize, head: &mut Head) -> Result<Vec<
                 .map(|(quarter, _)| format!("{name}q{quarter}"))
                 .collect(),
             id: name,
-            inputs: inputs(place),
+            inputs: squares.inputs(place),
             seconds: rates.tile(&own),
             memory: Some(rates.memory_of_tile(&own)),
         });
-        head.bill.bytes_read += bytes_of.get(place).copied().unwrap_or(0);
+        head.bill.bytes_read += bytes;
         let cells = own.size[0] as u64 * own.size[1] as u64;
-        head.bill.bytes_written += 4 * cells * head.bands.len() as u64;
+        head.bill.bytes_written += 4 * cells * bands.len() as u64;
         head.bill.cells += cells;
     }
-    head.levels.push(tasks.len() - before);
-    head.levels.retain(|&count| count > 0);
-    Ok(tasks)
-}
-
-/// The tile and those around it.
-fn neighbours(
-    [column, row]: [usize; 2],
-    [across, down]: [usize; 2],
-) -> impl Iterator<Item = [usize; 2]> {
-    let rows = row.saturating_sub(1)..(row + 2).min(down);
-    rows.flat_map(move |row| {
-        (column.saturating_sub(1)..(column + 2).min(across)).map(move |column| [column, row])
-    })
+    head.bands = bands;
+    let levels: Vec<Vec<Task>> = levels.into_values().chain([last]).collect();
+    head.levels = levels.iter().map(Vec::len).collect();
+    Ok(levels.into_iter().flatten().collect())
 }

@@ -17,6 +17,7 @@
 //! - `occlusion`: `ao`;  `sunlight`: `sun`;  `sight`: `visible`
 //! - `terrain`: height rasters and viewsheds;  `mapping`: maps of their cells;  `around`: terrain around a scene;  `placing`: sensors on surfaces, and times of `sun`
 //! - `grouping`: results by object and facade, elevations, moving shadows; `factors`;  `horizons`: `horizon`
+//! - `plans`: tiles and shares of jobs
 //! - `book`: links, tables and code of the pages for readers
 //! - `looks`: meshes with materials, camera flags, layers, pictures for displays
 //! - `cameras`: cameras in `info` and `ao`, and light from images around a mesh
@@ -43,6 +44,7 @@ mod mapping;
 mod occlusion;
 mod outputs;
 mod placing;
+mod plans;
 mod rendering;
 mod resuming;
 mod sight;

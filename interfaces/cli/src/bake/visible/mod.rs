@@ -11,6 +11,7 @@ use antumbra::{Aabb, LocalOrigin};
 use antumbra_bake::{Array, BitMatrix, Entry, Eyes, Orientation, Sensors, UpAxis, VisibilityJob};
 use antumbra_lab::count;
 use antumbra_raster::{Quantity, unit_name};
+use antumbra_tiles::Indexed;
 use clap::{ArgAction, ArgGroup, Args, ValueEnum};
 
 use super::command::{Bake, Baking, Done, Figure, Named};
@@ -19,6 +20,7 @@ use super::ground::{self, Ground};
 use super::map::{self, Plan, Words};
 use super::raster;
 use super::site::Asked;
+use super::tile::Tiling;
 use crate::args::{
     ChunkArgs, MapArgs, RasterArgs, SCENE, SCENE_LONG, UnitArgs, heading, up_axis, values,
 };
@@ -46,6 +48,15 @@ impl Shown {
             Self::SeenBy => "seen_by",
             Self::Height => "height",
             Self::Angle => "angle",
+        }
+    }
+
+    /// Unit in files, once that of lengths is settled.
+    fn unit(self, args: &VisibleArgs) -> String {
+        match self {
+            Self::SeenBy => String::new(),
+            Self::Height => args.units.known().map(unit_name).unwrap_or_default(),
+            Self::Angle => "degrees".to_owned(),
         }
     }
 }
@@ -170,6 +181,10 @@ impl Baking for VisibleArgs {
         let from = ("the points", Some(self.from.as_path()));
         let to = ("the points", self.to.as_deref());
         [vec![("--lines", self.lines.as_deref())], vec![from, to]]
+    }
+
+    fn tiling(&self, raster: &Indexed) -> Result<Tiling, Failure> {
+        viewshed::tiling(self, raster)
     }
 
     fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {

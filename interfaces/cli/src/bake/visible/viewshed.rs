@@ -2,18 +2,22 @@
 
 use std::time::Instant;
 
+use antumbra::{Bvh, Recipe};
 use antumbra_bake::{
     Curvature, HeightField, Limits, Mesh, Observer, Orientation, Sensors, TargetHeightJob,
     ViewshedJob, Viewsheds,
 };
-use antumbra_raster::{Quantity, unit_name};
+use antumbra_raster::Quantity;
+use antumbra_terrain::{Monitor, Share, Tile};
+use antumbra_tiles::Indexed;
 
 use super::lines::{self, Ends};
 use super::{Shown, Sight, VisibleArgs};
 use crate::bake::command::{Bake, Done};
 use crate::bake::files::{self, Column, Format};
+use crate::bake::map;
 use crate::bake::terrain::{Terrain, is_terrain};
-use crate::bake::{map, raster};
+use crate::bake::tile::{self, TileWork, Tiling};
 use crate::exit::{Failure, tell};
 use crate::output::Files;
 use crate::progress::Progress;
@@ -55,7 +59,14 @@ pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), 
     let start = Instant::now();
     let field = terrain.field()?;
     let build_seconds = start.elapsed().as_secs_f64();
-    let table = Table::read(args, &field, &terrain)?;
+    let table = match bake.tile {
+        Some(work) => Table::read(args, |point| TileWork::observer(work.raster, point))?,
+        None => Table::read(args, |point| Ok(field.observer(point)))?,
+    };
+    if bake.tile.is_none() {
+        let ends = [terrain.extent.low, terrain.extent.high].map(|corner| corner.to_array());
+        super::warn_of_far(&args.from, table.points.iter().copied(), ("raster", ends));
+    }
     let limits = Limits {
         target: args.target,
         drop: drop(args)?,
@@ -64,6 +75,18 @@ pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), 
     if args.show == Shown::Height && args.target > 0.0 {
         let reason = "--show height is the height that targets need: leave out --target";
         return Err(Failure::Usage(reason.into()));
+    }
+    if let Some(work) = bake.tile {
+        let progress = Progress::new(&terrain.name);
+        let mut values = Values::new(args.show, &terrain.heights.raster.values);
+        for (index, observer) in table.observers.iter().enumerate() {
+            let share = Share(&progress, [index, table.observers.len()]);
+            work.seen(observer, &limits, |field, observer, own| {
+                values.add((field, observer, limits), own, &share)
+            })?;
+        }
+        progress.finish();
+        return write(args, (&terrain, 0.0), &table, &values.all, None);
     }
     let job = ViewshedJob::new(&field, &table.observers, limits)?;
     let of = table.observers.len();
@@ -104,6 +127,82 @@ pub fn run(args: &VisibleArgs, bake: &Bake<'_>, mut files: Files) -> Result<(), 
         seconds: [terrain.load_seconds, build_seconds],
     };
     sight.end(args, bake, &done, || terrain.tell())
+}
+
+/// How the viewsheds of tiles are computed.
+pub fn tiling(args: &VisibleArgs, raster: &Indexed) -> Result<Tiling, Failure> {
+    if !is_of_cells(args) {
+        let reason = "tiles of an index are for --viewshed of its cells";
+        return Err(Failure::usage(reason));
+    }
+    tile::settle(raster, &super::asked(args))?;
+    let index = raster.index();
+    let table = Table::read(args, |point| TileWork::observer(raster, point))?;
+    super::warn_of_far(
+        &args.from,
+        table.points.iter().copied(),
+        ("raster", [index.low, index.high]),
+    );
+    let unit = args.show.unit(args);
+    Ok(Tiling {
+        directions: Vec::new(),
+        bands: vec![[args.show.name().to_owned(), unit]],
+    })
+}
+
+/// Values of a tile, from viewsheds of one observer after the other.
+struct Values {
+    show: Shown,
+    all: Vec<f32>,
+}
+
+impl Values {
+    /// Of nobody, for cells of these heights.
+    fn new(show: Shown, heights: &[f64]) -> Self {
+        let none = match show {
+            Shown::SeenBy => 0.0,
+            Shown::Height => f32::INFINITY,
+            Shown::Angle => f32::NAN,
+        };
+        let of = |height: &f64| if height.is_nan() { f32::NAN } else { none };
+        Self {
+            show,
+            all: heights.iter().map(of).collect(),
+        }
+    }
+
+    /// Adds an observer on a field, of which the cells are a part.
+    fn add(
+        &mut self,
+        (field, observer, limits): (&HeightField<'_>, &Observer, Limits),
+        own: Tile,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Failure> {
+        let observers = [*observer];
+        let job = ViewshedJob::new(field, &observers, limits)?;
+        let no_tree = Bvh::build(&[], &Recipe::default()).map_err(Failure::work)?;
+        let found = match self.show {
+            Shown::Height => TargetHeightJob(job).heights(monitor)?,
+            show => {
+                let found = antumbra_bake::run(&job, &no_tree, monitor)?;
+                match show {
+                    Shown::Angle => job.elevations(&found),
+                    _ => counts(&found, field.heights()),
+                }
+            }
+        };
+        let ([column, row], [width, height]) = (own.at.map(|at| at as usize), own.size);
+        let rows = found.chunks_exact(field.size()[0]).skip(row).take(height);
+        for (all, found) in self.all.chunks_exact_mut(width).zip(rows) {
+            for (own, &found) in all.iter_mut().zip(&found[column..]) {
+                *own = match self.show {
+                    Shown::SeenBy => *own + found,
+                    _ => own.min(found),
+                };
+            }
+        }
+        Ok(())
+    }
 }
 
 /// Numbers of observers that see each cell with data.
@@ -151,8 +250,7 @@ impl Table {
     /// Reads a table. Eyes are so high above its points, and points without a height are on the surface.
     fn read(
         args: &VisibleArgs,
-        field: &HeightField<'_>,
-        terrain: &Terrain,
+        observer: impl Fn([f64; 3]) -> Result<Option<Observer>, Failure>,
     ) -> Result<Self, Failure> {
         let path = &args.from;
         let name = path.display();
@@ -166,7 +264,7 @@ impl Table {
         let mut observers = Vec::with_capacity(points.len());
         for (index, point) in points.iter_mut().enumerate() {
             let off = || antumbra_bake::Error::OffSurface { index };
-            let observer = field.observer(*point).ok_or_else(off);
+            let observer = observer(*point)?.ok_or_else(off);
             let mut observer =
                 observer.map_err(|error| Failure::Data(format!("{name}: {error}")))?;
             point[2] = observer.height;
@@ -175,8 +273,6 @@ impl Table {
             }
             observers.push(observer.raised(args.eye));
         }
-        let ends = [terrain.extent.low, terrain.extent.high].map(|corner| corner.to_array());
-        super::warn_of_far(path, points.iter().copied(), ("raster", ends));
         Ok(Self { observers, points })
     }
 }
@@ -191,19 +287,14 @@ fn write(
 ) -> Result<(), Failure> {
     let _writing = interrupt::writing();
     let name = args.show.name();
-    let unit = match args.show {
-        Shown::SeenBy => String::new(),
-        Shown::Height => args.units.known().map(unit_name).unwrap_or_default(),
-        Shown::Angle => "degrees".to_owned(),
-    };
+    let unit = args.show.unit(args);
     let quantity = Quantity { name, unit: &unit };
     let raster = &terrain.heights.raster;
     let mut others = Vec::new();
     for path in &args.output {
         match Format::of_sensors(path)? {
             Format::Raster => {
-                let grid = terrain.grid(args.raster.crs.as_ref());
-                raster::write_values(path, &grid, values, &[quantity])?;
+                terrain.write(path, args.raster.crs.as_ref(), values, &[quantity])?;
             }
             Format::Picture => {
                 let place = (north, args.units.known());

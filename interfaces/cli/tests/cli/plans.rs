@@ -1,0 +1,379 @@
+//! Plans: tiles and shares of jobs, whatever is cut, in any order, and whatever is lost.
+
+use std::fs;
+use std::path::Path;
+
+use antumbra_raster::{Crs, Grid, Quantity, write};
+use antumbra_testkit::Rng;
+
+use crate::support::Place;
+
+const HEIGHT: Quantity<'_> = Quantity {
+    name: "height",
+    unit: "m",
+};
+
+/// A raster of hills and walls with holes, written as a whole and as files that overlap a little.
+fn raster(place: &Place, random: &mut Rng) -> [usize; 2] {
+    let size @ [width, height] = [70 + random.below(90), 70 + random.below(60)];
+    let mut grid = Grid::north_up(size, [600_000.0, 5_340_000.0], 2.0);
+    grid.crs = Some(Crs::from_epsg(25_832).expect("a code"));
+    let waves: Vec<[f64; 3]> = (0..6)
+        .map(|_| {
+            [
+                0.02 + 0.2 * f64::from(random.unit()),
+                0.3 * f64::from(random.unit()) - 0.15,
+                7.0 * f64::from(random.unit()),
+            ]
+        })
+        .collect();
+    let mut heights: Vec<f32> = (0..width * height)
+        .map(|cell| {
+            let [x, y] = [(cell % width) as f64, (cell / width) as f64];
+            let hills = waves
+                .iter()
+                .map(|[a, b, c]| 4.0 * (a * x + b * y + c).sin());
+            hills.sum::<f64>() as f32
+        })
+        .collect();
+    for _ in 0..12 {
+        let [left, top] = [random.below(width - 8), random.below(height - 8)];
+        let roof = if random.below(4) == 0 {
+            f32::NAN
+        } else {
+            20.0 * random.unit()
+        };
+        for row in top..top + 2 + random.below(6) {
+            heights[row * width + left..][..2 + random.below(6)].fill(roof);
+        }
+    }
+    let file = |name: &str, grid: &Grid, heights: &[f32]| {
+        let bytes = write(name.as_ref(), grid, heights, &[HEIGHT]).expect("a raster");
+        place.write(name, bytes);
+    };
+    file("whole.tif", &grid, &heights);
+    fs::create_dir_all(place.path("parts")).expect("a folder");
+    let cuts = [
+        20 + random.below(width - 40),
+        20 + random.below(height - 40),
+    ];
+    for (number, [right, down]) in [[0, 0], [1, 0], [0, 1], [1, 1]].into_iter().enumerate() {
+        let at = [[0, cuts[0]][right], [0, cuts[1]][down]];
+        let more = random.below(5);
+        let end = [
+            [cuts[0] + more, width][right],
+            [cuts[1] + more, height][down],
+        ];
+        let mut own = grid.clone();
+        [own.width, own.height] = [end[0] - at[0], end[1] - at[1]];
+        let [x, y] = grid.corner(at[0] as f64, at[1] as f64);
+        (own.transform[0], own.transform[3]) = (x, y);
+        let rows = heights.chunks_exact(width).take(end[1]).skip(at[1]);
+        let cells: Vec<f32> = rows.flat_map(|row| &row[at[0]..end[0]]).copied().collect();
+        file(&format!("parts/{number}.tif"), &own, &cells);
+    }
+    size
+}
+
+/// Ids of tasks with those that they need.
+fn tasks(plan: &Path) -> Vec<(String, Vec<String>)> {
+    let text = fs::read_to_string(plan).expect("a plan");
+    let task = |line: &str| {
+        let task: serde_json::Value = serde_json::from_str(line).expect("JSON");
+        let names = task["after"].as_array().expect("a list").iter();
+        let name = |name: &serde_json::Value| name.as_str().expect("a name").to_owned();
+        (name(&task["id"]), names.map(name).collect())
+    };
+    text.lines().skip(1).map(task).collect()
+}
+
+/// Runs all tasks in some order that is allowed, each by itself.
+fn run_in_any_order(place: &Place, plan: &str, random: &mut Rng) {
+    let mut open = tasks(&place.path(plan));
+    let mut done: Vec<String> = Vec::new();
+    while !open.is_empty() {
+        let is_ready =
+            |(_, after): &&(String, Vec<String>)| after.iter().all(|id| done.contains(id));
+        let ready: Vec<String> = open
+            .iter()
+            .filter(is_ready)
+            .map(|(id, _)| id.clone())
+            .collect();
+        let id = ready[random.below(ready.len())].clone();
+        place.run(&["run", plan, "--task", &id]).expect(0);
+        open.retain(|(other, _)| *other != id);
+        done.push(id);
+    }
+}
+
+/// Bits of all cells of a raster.
+fn bits(place: &Place, name: &str) -> Vec<u64> {
+    let values = place.raster(name).values.into_iter();
+    values
+        .map(|value| if value.is_nan() { 0 } else { value.to_bits() })
+        .collect()
+}
+
+#[test]
+fn tiles_have_the_bits_of_the_whole_for_any_partition_and_order() {
+    let jobs: [&[&str]; 6] = [
+        &[
+            "horizon",
+            "--cells",
+            "--azimuths",
+            "lattice:16",
+            "--show",
+            "sky-view",
+        ],
+        &[
+            "horizon",
+            "--cells",
+            "--azimuths",
+            "12",
+            "--first",
+            "7",
+            "--show",
+            "openness",
+            "--height",
+            "1",
+        ],
+        &["horizon", "--cells", "--azimuths", "1", "--first", "33.3"],
+        &[
+            "sun",
+            "--cells",
+            "--from",
+            "2025-12-21T08:00",
+            "--to",
+            "2025-12-21T16:00",
+            "--step",
+            "60",
+        ],
+        &["visible", "eyes.csv", "--viewshed", "--eye", "1.6"],
+        &[
+            "visible",
+            "eyes.csv",
+            "--viewshed",
+            "--eye",
+            "3",
+            "--show",
+            "height",
+        ],
+    ];
+    let mut random = Rng::new(52);
+    for round in 0..6 {
+        let place = Place::empty();
+        let size = raster(&place, &mut random);
+        let mut eyes = "x,y\n".to_owned();
+        for _ in 0..3 {
+            let [x, y] = [0, 1]
+                .map(|axis| (3.0 + f64::from(random.unit()) * (size[axis] as f64 - 6.0)) * 2.0);
+            eyes += &format!("{},{}\n", 600_000.0 + x, 5_340_000.0 - y);
+        }
+        // No eye is in a hole.
+        place.write("eyes.csv", eyes);
+        place.run(&["index", "parts", "-o", "all.index"]).expect(0);
+        for (number, job) in jobs
+            .iter()
+            .enumerate()
+            .filter(|(number, _)| (number + round) % 2 == 0)
+        {
+            let (name, flags) = job.split_first().expect("a command");
+            let whole = place.run(&[&[name, "whole.tif"][..], flags, &["-o", "a.tif"]].concat());
+            if *name == "visible" && whole.code != 0 {
+                continue;
+            }
+            whole.expect(0);
+            let side = (16 + random.below(60)).to_string();
+            let plan = format!("{number}.jsonl");
+            let head = ["plan", "all.index", "-o", &plan, "--tile", &side, name];
+            place.run(&[&head[..], flags].concat()).expect(0);
+            run_in_any_order(&place, &plan, &mut random);
+            place.run(&["check", &plan]).expect(0);
+            place
+                .run(&["merge", &plan, "-o", "b.tif", "-o", "b.vrt"])
+                .expect(0);
+            for other in ["b.tif", "b.vrt"] {
+                assert!(
+                    bits(&place, "a.tif") == bits(&place, other),
+                    "{round}: {job:?}, tiles of {side}: {other}"
+                );
+            }
+        }
+    }
+}
+
+/// A plan of one day of sun in four tiles.
+fn sunny(place: &Place) {
+    raster(place, &mut Rng::new(7));
+    place.run(&["index", "parts", "-o", "all.index"]).expect(0);
+    let job = [
+        "sun",
+        "--cells",
+        "--from",
+        "2025-12-21T11:00",
+        "--to",
+        "2025-12-21T12:00",
+    ];
+    let head = ["plan", "all.index", "-o", "plan.jsonl", "--tile", "40"];
+    place.run(&[&head[..], &job].concat()).expect(0);
+}
+
+#[test]
+fn tasks_are_done_once_and_what_is_lost_is_done_again() {
+    let place = Place::empty();
+    sunny(&place);
+    let all: Vec<String> = tasks(&place.path("plan.jsonl"))
+        .into_iter()
+        .map(|(id, _)| id)
+        .collect();
+    let check = place.run(&["check", "plan.jsonl"]).expect(1);
+    assert_eq!(
+        check.stdout.lines().collect::<Vec<_>>(),
+        all,
+        "all are missing"
+    );
+    place
+        .run(&["run", "plan.jsonl", "--task", "0", &all[2]])
+        .expect(0);
+    let merge = place
+        .run(&["merge", "plan.jsonl", "-o", "sun.tif"])
+        .expect(1);
+    assert!(
+        merge
+            .stderr
+            .contains(&format!("the task {} is not done", all[1])),
+        "{}",
+        merge.stderr
+    );
+    place.run(&["run", "plan.jsonl"]).expect(0);
+    let sums = || {
+        let name = |id: &String| place.path(&format!("plan.jsonl.results/{id}.tif"));
+        let read = |id: &String| fs::read(name(id)).expect("a result");
+        all.iter().map(read).collect::<Vec<Vec<u8>>>()
+    };
+    let before = sums();
+    let [result, receipt] =
+        ["tif", "receipt.json"].map(|end| format!("plan.jsonl.results/{}.{end}", all[1]));
+    let text = fs::read_to_string(place.path(&receipt)).expect("a receipt");
+    type Damage<'a> = (&'a str, &'a dyn Fn());
+    let damages: [Damage<'_>; 5] = [
+        ("a lost result", &|| {
+            fs::remove_file(place.path(&result)).expect("removed")
+        }),
+        ("a lost receipt", &|| {
+            fs::remove_file(place.path(&receipt)).expect("removed")
+        }),
+        ("half a receipt", &|| {
+            place.write(&receipt, &text[..text.len() / 2])
+        }),
+        ("a damaged result", &|| place.write(&result, "no raster")),
+        ("the receipt of another job", &|| {
+            place.write(&receipt, text.replace("\"key\":\"", "\"key\":\"0"))
+        }),
+    ];
+    for (what, damage) in damages {
+        damage();
+        let check = place.run(&["check", "plan.jsonl"]).expect(1);
+        assert_eq!(check.stdout.trim(), all[1], "{what}");
+        let run = place.run(&["run", "plan.jsonl"]).expect(0);
+        assert!(
+            run.stderr.contains("1 tasks done; "),
+            "{what}: {}",
+            run.stderr
+        );
+        assert!(sums() == before, "{what}");
+        place.run(&["check", "plan.jsonl"]).expect(0);
+    }
+}
+
+#[test]
+fn other_inputs_are_refused_by_name() {
+    let place = Place::empty();
+    sunny(&place);
+    let whole = fs::read(place.path("parts/0.tif")).expect("a file");
+    let mut changed = whole.clone();
+    *changed.last_mut().expect("a byte") ^= 1;
+    place.write("parts/0.tif", changed);
+    let run = place.run(&["run", "plan.jsonl", "--task", "0"]).expect(65);
+    assert!(
+        run.stderr.contains("parts/0.tif") && run.stderr.contains("make the plan again"),
+        "{}",
+        run.stderr
+    );
+    // Also where the command is given by itself.
+    let job = [
+        "sun",
+        "all.index",
+        "--cells",
+        "--from",
+        "2025-12-21T11:00",
+        "--to",
+        "2025-12-21T12:00",
+    ];
+    let sun = place.run(&[&job[..], &["-o", "a.tif"]].concat()).expect(65);
+    assert!(
+        sun.stderr.contains("make the index again"),
+        "{}",
+        sun.stderr
+    );
+    place.write("parts/0.tif", whole);
+    // Another index has other peaks.
+    let index = fs::read_to_string(place.path("all.index")).expect("an index");
+    place
+        .run(&["index", "whole.tif", "-o", "all.index"])
+        .expect(0);
+    let run = place.run(&["run", "plan.jsonl", "--task", "0"]).expect(65);
+    assert!(
+        run.stderr.contains("all.index has the checksum"),
+        "{}",
+        run.stderr
+    );
+    place.write("all.index", index);
+    let run = place.run(&["run", "plan.jsonl", "--task", "0"]).expect(65);
+    assert!(
+        run.stderr.contains("all.index.peaks: error: it is not of"),
+        "{}",
+        run.stderr
+    );
+    let run = place
+        .run(&["run", "plan.jsonl", "--task", "north"])
+        .expect(2);
+    assert!(
+        run.stderr.contains("there is no task north"),
+        "{}",
+        run.stderr
+    );
+}
+
+#[test]
+fn shares_of_other_scenes_are_plans_too() {
+    let place = Place::empty();
+    let job = ["--resolution", "32x18", "--spp", "2"];
+    place
+        .run(&[&["render", "builtin:city:2000", "-o", "a.png"][..], &job].concat())
+        .expect(0);
+    let head = [
+        "plan",
+        "builtin:city:2000",
+        "-o",
+        "city.jsonl",
+        "--tasks",
+        "3",
+        "render",
+    ];
+    place.run(&[&head[..], &job].concat()).expect(0);
+    run_in_any_order(&place, "city.jsonl", &mut Rng::new(3));
+    place.run(&["check", "city.jsonl"]).expect(0);
+    place.run(&["merge", "city.jsonl", "-o", "b.png"]).expect(0);
+    let [a, b] = ["a.png", "b.png"].map(|name| place.image(name));
+    assert!(a == b, "the same picture");
+    // Flags that would write a file of each task are refused, and so are commands without tasks.
+    for (more, reason) in [
+        (&["render", "--json", "a.json"][..], "--json"),
+        (&["info"], "a plan is for"),
+    ] {
+        let head = ["plan", "builtin:city:2000", "-o", "other.jsonl"];
+        let plan = place.run(&[&head[..], more].concat()).expect(2);
+        assert!(plan.stderr.contains(reason), "{}", plan.stderr);
+    }
+}
