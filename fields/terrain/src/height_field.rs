@@ -94,6 +94,22 @@ impl<'a> HeightField<'a> {
         Ok(field)
     }
 
+    /// Parts of a raster without holes; NaN where it is not known. Only for walks, which pass over NaN.
+    pub(crate) fn of_parts(
+        [width, height]: [usize; 2],
+        rows: &'a [f64],
+        transform: [f64; 6],
+    ) -> Self {
+        Self {
+            width,
+            height,
+            rows,
+            transform,
+            wires: HashSet::new(),
+            has_holes: false,
+        }
+    }
+
     /// Finds neighbours with data that no triangle joins.
     fn find_wires(&mut self) {
         let has = |column: usize, row: usize| {

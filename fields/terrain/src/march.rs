@@ -107,7 +107,7 @@ impl<'a> March<'a> {
         };
         let mut found = memory::filled("horizons", width * height, f32::NAN)?;
         let start = |_: &f32| f64::NEG_INFINITY;
-        self.walk(&eyes, azimuth, (start, of), &mut found, monitor)?;
+        self.walk((&eyes, None), azimuth, (start, of), &mut found, monitor)?;
         Ok(found)
     }
 
@@ -141,12 +141,23 @@ impl<'a> March<'a> {
         monitor: &dyn Monitor,
     ) -> Result<(), Error> {
         eyes.check(slopes)?;
+        self.raise_of((eyes, None), azimuth, slopes, monitor)
+    }
+
+    /// The same for some squares of the eyes.
+    pub(crate) fn raise_of(
+        &self,
+        eyes: (&Eyes<'_>, Option<&Seeing>),
+        azimuth: f64,
+        slopes: &mut [f64],
+        monitor: &dyn Monitor,
+    ) -> Result<(), Error> {
         self.walk(eyes, azimuth, (|&own| own, |own| own), slopes, monitor)
     }
 
     fn walk<T: Send>(
         &self,
-        eyes: &Eyes<'_>,
+        (eyes, seeing): (&Eyes<'_>, Option<&Seeing>),
         azimuth: f64,
         ends: (impl Fn(&T) -> f64 + Sync, impl Fn(f64) -> T + Sync),
         found: &mut [T],
@@ -162,6 +173,7 @@ impl<'a> March<'a> {
             drop: self.drop,
             way: &Way::new(&lines, field.has_holes(), size[0]),
             eyes,
+            seeing,
         };
         look.walk(ends, found, monitor)
     }
@@ -175,23 +187,33 @@ impl Eyes<'_> {
         Lines::new(step, (at, eyes), cells)
     }
 
-    /// Marks the squares of a field whose peaks may be above one of the horizons so far, along such lines of sight to its cells.
+    /// All squares of eyes.
+    pub(crate) fn seeing(&self) -> Result<Vec<AtomicBool>, Error> {
+        let rows = self.heights.len() / self.width;
+        marks(self.width.div_ceil(SIDE) * rows.div_ceil(SIDE), true)
+    }
+
+    /// Marks the squares of a field whose peaks may be above one of the horizons so far, along such lines of sight to its cells,
+    /// and the squares of eyes from which they are. Of each of these, only so many stretches get marks, first those whose peaks may
+    /// be highest above a horizon: what they are in truth mostly hides the others.
     pub(crate) fn mark(
         &self,
-        (levels, marks): (&[Peaks; 3], &[AtomicBool]),
+        (levels, marks, most): (&[Peaks; 3], &[AtomicBool], usize),
+        seeing: &Seeing,
         lines: &Lines,
         [rise, drop]: [f64; 2],
         slopes: &mut [f64],
         monitor: &dyn Monitor,
     ) -> Result<(), Error> {
         let look = Look {
-            goal: Goal::Marks(marks),
+            goal: Goal::Marks(marks, most),
             levels,
             rise,
             drop,
             // Beside holes there are more edges, which does not matter elsewhere.
             way: &Way::new(lines, true, 0),
             eyes: self,
+            seeing: Some(seeing),
         };
         look.walk((|&own: &f64| own, |own| own), slopes, monitor)
     }
@@ -208,6 +230,13 @@ impl Eyes<'_> {
         let wanted = "at most 2^28 columns or rows between a field and those who see it";
         Error::check_range("column or row of eyes", far as f64, is_in, wanted)
     }
+}
+
+/// So many marks that are set or not.
+pub(crate) fn marks(count: usize, are_set: bool) -> Result<Vec<AtomicBool>, Error> {
+    let mut marks = memory::room("marks", count)?;
+    marks.resize_with(count, || AtomicBool::new(are_set));
+    Ok(marks)
 }
 
 /// Crossings between two distances.
@@ -294,11 +323,14 @@ impl Way {
     }
 }
 
-/// What eyes look for: the surface of a field, or marks of squares of a field of which only peaks are known.
+/// What eyes look for: the surface of a field, or marks of squares of a field of which only peaks are known, in so many stretches.
 enum Goal<'a> {
     Surface(&'a HeightField<'a>),
-    Marks(&'a [AtomicBool]),
+    Marks(&'a [AtomicBool], usize),
 }
+
+/// Marks of the squares of eyes that may see something.
+pub(crate) type Seeing = [AtomicBool];
 
 /// What eyes look at.
 struct Look<'a> {
@@ -308,6 +340,8 @@ struct Look<'a> {
     drop: f64,
     way: &'a Way,
     eyes: &'a Eyes<'a>,
+    /// Squares of eyes that look, or those that marked something.
+    seeing: Option<&'a Seeing>,
 }
 
 impl<'a> Look<'a> {
@@ -406,6 +440,13 @@ impl<T, Start: Fn(&T) -> f64, Of: Fn(f64) -> T> Band<'_, T, Start, Of> {
     fn square(&mut self, [column, first]: [usize; 2], hint: usize) -> usize {
         let look = self.look;
         let width = look.eyes.width;
+        let index = (self.row + first) / SIDE * width.div_ceil(SIDE) + column / SIDE;
+        if look
+            .seeing
+            .is_some_and(|seeing| !seeing[index].load(Ordering::Relaxed))
+        {
+            return hint;
+        }
         let found = &mut self.found[first * width..];
         let mut square = look.square([column, self.row + first], found, self.start);
         square.hint = hint;
@@ -438,6 +479,52 @@ struct Square<'a> {
     hint: usize,
 }
 
+/// Small stretches that the lowest eye of a square sees highest.
+struct Best {
+    lowest: f64,
+    most: usize,
+    /// Slopes to the peaks of stretches, and their numbers.
+    found: Vec<(f64, usize)>,
+    /// Stretches of which the slope is at most this one are left out.
+    least: f64,
+}
+
+impl Best {
+    fn new(square: &Square<'_>) -> Self {
+        let eyes = square.eyes.iter().flatten();
+        Self {
+            lowest: eyes.fold(f64::INFINITY, |lowest, &eye| lowest.min(eye)),
+            most: match square.look.goal {
+                Goal::Marks(_, most) => 4 * most,
+                Goal::Surface(_) => 0,
+            },
+            found: Vec::new(),
+            least: f64::NEG_INFINITY,
+        }
+    }
+
+    #[inline(always)]
+    fn slope(&self, square: &Square<'_>, level: usize, stretch: &Stretch) -> f64 {
+        let up = square.look.levels[level].most(square.windows(stretch)) - self.lowest;
+        up * stretch.reciprocals[usize::from(up <= 0.0)]
+    }
+
+    /// Whether a stretch of a level is left out.
+    #[inline(always)]
+    fn leaves(&self, square: &Square<'_>, level: usize, stretch: &Stretch) -> bool {
+        self.least > f64::NEG_INFINITY && self.slope(square, level, stretch) <= self.least
+    }
+
+    fn add(&mut self, square: &Square<'_>, index: usize, stretch: &Stretch) {
+        self.found.push((self.slope(square, 0, stretch), index));
+        if self.found.len() > 2 * self.most {
+            self.found.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+            self.least = self.found[self.most].0;
+            self.found.truncate(self.most);
+        }
+    }
+}
+
 impl Square<'_> {
     #[inline(always)]
     fn all(&mut self) {
@@ -448,62 +535,102 @@ impl Square<'_> {
             let rows = self.rows_below(0, stretch);
             self.take(field, self.hint, stretch, rows);
         }
+        let mut best = Best::new(self);
         for large in &stretches[2] {
-            if self.rows_below(2, large) == [false; SIDE] {
+            if best.leaves(self, 2, large) || self.rows_below(2, large) == [false; SIDE] {
                 continue;
             }
             for middle in &stretches[1][large.parts.clone()] {
-                if self.rows_below(1, middle) == [false; SIDE] {
+                if best.leaves(self, 1, middle) || self.rows_below(1, middle) == [false; SIDE] {
                     continue;
                 }
                 for index in middle.parts.clone() {
                     let stretch = &stretches[0][index];
+                    if best.leaves(self, 0, stretch) {
+                        continue;
+                    }
                     let rows = self.rows_below(0, stretch);
                     if rows == [false; SIDE] {
                         continue;
                     }
                     match self.look.goal {
                         Goal::Surface(field) => self.take(field, index, stretch, rows),
-                        Goal::Marks(marks) => self.mark(marks, stretch, rows),
+                        Goal::Marks(..) => best.add(self, index, stretch),
                     }
                 }
             }
+        }
+        if let (Goal::Marks(marks, most), Some(seeing)) = (&self.look.goal, self.look.seeing) {
+            best.found.sort_by(|(a, _), (b, _)| b.total_cmp(a));
+            let found = best.found.iter();
+            let marked = found.filter(|(_, index)| self.mark(marks, &stretches[0][*index]));
+            let is_seeing = marked.take(*most).count() > 0 || best.least > f64::NEG_INFINITY;
+            let columns = self.look.eyes.width.div_ceil(SIDE);
+            let own = self.row / SIDE * columns + self.column / SIDE;
+            seeing[own].store(is_seeing, Ordering::Relaxed);
         }
     }
 
-    /// Marks squares with ends of edges that a small stretch crosses, if their peaks may be above the horizon of an eye.
-    fn mark(&self, marks: &[AtomicBool], stretch: &Stretch, rows: [bool; SIDE]) {
-        let Look { way, levels, .. } = self.look;
-        let is_marked = |square: usize| marks[square].load(Ordering::Relaxed);
-        if levels[0].squares(self.windows(stretch)).all(is_marked) {
-            return;
+    /// Marks squares with ends of edges that a small stretch crosses, if their peaks may be above the horizon of an eye. Whether
+    /// there are any.
+    fn mark(&self, marks: &[AtomicBool], stretch: &Stretch) -> bool {
+        let squares = self.look.levels[0].squares(self.windows(stretch));
+        let may_rise = |(square, cells, peak): &(usize, [Range<isize>; 2], f64)| {
+            let rows = self.rows_of(*peak, stretch);
+            rows != [false; SIDE]
+                && (marks[*square].load(Ordering::Relaxed)
+                    || self.crosses(stretch, rows, cells, *peak))
+        };
+        let highest = squares.filter(may_rise).max_by(|a, b| a.2.total_cmp(&b.2));
+        if let Some((square, ..)) = highest {
+            marks[square].store(true, Ordering::Relaxed);
         }
-        let at = [self.column, self.row].map(|at| at as isize);
-        for crossing in &way.crossings[stretch.parts.clone()] {
+        highest.is_some()
+    }
+
+    /// Whether a crossing of a small stretch with an end in some columns and rows may be above the horizon of an eye.
+    fn crosses(
+        &self,
+        stretch: &Stretch,
+        rows: [bool; SIDE],
+        cells: &[Range<isize>; 2],
+        peak: f64,
+    ) -> bool {
+        let way = self.look.way;
+        way.crossings[stretch.parts.clone()].iter().any(|crossing| {
             let far = self.look.drop * crossing.distance;
-            for row in (0..SIDE).filter(|&row| rows[row]) {
-                for lane in 0..SIDE {
-                    let ends = crossing.ends.map(|[column, line]| {
-                        [at[0] + column + lane as isize, at[1] + line + row as isize]
-                    });
-                    let is_in =
-                        |axis: usize| ends.iter().all(|end| way.cells[axis].contains(&end[axis]));
-                    for (square, peak) in ends.into_iter().filter_map(|end| levels[0].around(end)) {
-                        let slope = (peak - self.eyes[row][lane]) * crossing.reciprocal - far;
-                        if slope > self.most[row][lane] && is_in(0) && is_in(1) {
-                            marks[square].store(true, Ordering::Relaxed);
-                        }
+            (0..SIDE).filter(|&row| rows[row]).any(|row| {
+                let at = [self.column, self.row + row].map(|at| at as isize);
+                let ends = crossing.ends.map(|end| [at[0] + end[0], at[1] + end[1]]);
+                ends.iter().any(|end| {
+                    if !cells[1].contains(&end[1]) {
+                        return false;
                     }
-                }
-            }
-        }
+                    let first = (cells[0].start - end[0]).clamp(0, SIDE as isize) as usize;
+                    let last = (cells[0].end - end[0]).clamp(0, SIDE as isize) as usize;
+                    (first..last.max(first)).any(|lane| {
+                        let slope = (peak - self.eyes[row][lane]) * crossing.reciprocal - far;
+                        let is_in = |end: &[isize; 2]| {
+                            way.cells[0].contains(&(end[0] + lane as isize))
+                                && way.cells[1].contains(&end[1])
+                        };
+                        slope > self.most[row][lane] && ends.iter().all(is_in)
+                    })
+                })
+            })
+        })
     }
 
     /// Rows of the square in which the horizon of a cell is below what the peak of a stretch may be.
     #[inline(always)]
     fn rows_below(&self, level: usize, stretch: &Stretch) -> [bool; SIDE] {
+        self.rows_of(self.look.levels[level].most(self.windows(stretch)), stretch)
+    }
+
+    /// The same for this peak.
+    #[inline(always)]
+    fn rows_of(&self, peak: f64, stretch: &Stretch) -> [bool; SIDE] {
         let mut rows = [false; SIDE];
-        let peak = self.look.levels[level].most(self.windows(stretch));
         if peak == f64::NEG_INFINITY {
             return rows;
         }

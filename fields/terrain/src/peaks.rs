@@ -157,10 +157,20 @@ impl Peaks {
         ]
     }
 
-    /// Numbers of these squares.
-    pub(crate) fn squares(&self, cells: [Range<isize>; 2]) -> impl Iterator<Item = usize> {
-        let ([columns, rows], count) = (self.ranges(cells), self.size[0]);
-        rows.flat_map(move |row| columns.clone().map(move |column| row * count + column))
+    /// Numbers of these squares, their own columns and rows, and their peaks.
+    pub(crate) fn squares(
+        &self,
+        cells: [Range<isize>; 2],
+    ) -> impl Iterator<Item = (usize, [Range<isize>; 2], f64)> {
+        let ([columns, rows], side) = (self.ranges(cells), self.side as isize);
+        let cells = move |at: usize| at as isize * side..(at as isize + 1) * side;
+        rows.flat_map(move |row| {
+            columns.clone().map(move |column| {
+                let number = row * self.size[0] + column;
+                let peak = self.peaks[row * self.stride + column];
+                (number, [cells(column), cells(row)], peak)
+            })
+        })
     }
 
     /// The largest of their peaks.

@@ -10,7 +10,7 @@
 
 use std::ops::Range;
 
-use super::{Own, Pull, Tile, Tiles, Way};
+use super::{Own, Pull, Read, Tile, Tiles, Way, Window, rectangles};
 use crate::crossing::floor;
 use crate::shadows::STEEP;
 use crate::{Error, HeightField, March, Monitor, Peaks, Shadows, memory, monitor::Share};
@@ -204,10 +204,10 @@ impl<T: Tiles> Pull<'_, T> {
         &self,
         own: &Own,
         directions: &[[f64; 2]],
-        read: &mut Vec<(usize, Tile)>,
+        read: &mut Read,
         monitor: &dyn Monitor,
     ) -> Result<Vec<Vec<u64>>, T::Error> {
-        let halves = |read: &mut Vec<_>| {
+        let halves = |read: &mut Read| {
             let (first, second) = directions.split_at(directions.len() / 2);
             let mut planes = self.light(own, first, read, &Share(monitor, [0, 2]))?;
             planes.extend(self.light(own, second, read, &Share(monitor, [1, 2]))?);
@@ -234,7 +234,7 @@ impl<T: Tiles> Pull<'_, T> {
                     continue;
                 }
                 if squares.is_none() {
-                    let levels = self.levels(tile)?;
+                    let levels = self.peaks_of(tile)?.levels()?;
                     let [columns, rows] = levels[0].size();
                     let marks = memory::filled("marks", columns * rows, false)?;
                     *squares = Some((levels, marks));
@@ -249,13 +249,19 @@ impl<T: Tiles> Pull<'_, T> {
         let mut parts = Vec::new();
         for (&tile, squares) in own.order.iter().zip(tiles) {
             if let Some((levels, marks)) = squares {
-                let windows = self.windows(own, tile, &levels[0], &marks);
-                parts.extend(windows.into_iter().map(|window| (tile, window)));
+                let (side, place) = (levels[0].side(), &self.tiles.tiles()[tile]);
+                for squares in rectangles(&marks, levels[0].size()[0]) {
+                    let at = |axis: usize, at: usize| place.at[axis] + (at * side) as i64;
+                    let first = [0, 1].map(|axis| at(axis, squares[axis].start));
+                    let end = [0, 1].map(|axis| at(axis, squares[axis].end));
+                    let part = Tile::between(first, end).within(place);
+                    parts.push((tile, part.wider(1).within(&own.whole)));
+                }
             }
         }
         let around = |all: Tile, (_, part): &(usize, Tile)| all.around(part);
-        let window = parts.iter().fold(own.window, around);
-        if window.cells() > MOST[0].min(MOST[1] * own.heights.len()) {
+        let all = parts.iter().fold(own.window, around);
+        if all.cells() > MOST[0].min(MOST[1] * own.heights.len()) {
             return match directions {
                 [direction] => self.walk(own, *direction, read, monitor),
                 _ => halves(read),
@@ -264,23 +270,16 @@ impl<T: Tiles> Pull<'_, T> {
         // Below all eyes.
         let low = (own.lowest - 1.0).min(own.lowest.next_down());
         let low = if low.is_finite() { low } else { 0.0 };
-        let mut heights = memory::filled("heights", window.cells(), low)?;
-        let mut put = |part: &Tile, from: &[f64]| {
-            let [column, row] = [0, 1].map(|axis| (part.at[axis] - window.at[axis]) as usize);
-            let rows = heights.chunks_exact_mut(window.size[0]).skip(row);
-            for (to, from) in rows.zip(from.chunks_exact(part.size[0])) {
-                to[column..][..part.size[0]].copy_from_slice(from);
-            }
-        };
-        put(&own.window, &own.around);
-        for (_, part) in &parts {
-            put(part, &self.read(part)?);
+        let mut window = Window::new(all, low)?;
+        window.put(&own.window, &own.around);
+        for (tile, part) in &parts {
+            read.tiles.insert(*tile);
+            window.put(part, &self.read(part, read)?);
         }
-        read.extend(parts);
-        let field = HeightField::new(window.size, &heights, self.tiles.transform())?;
+        let field = HeightField::new(all.size, &window.heights, self.tiles.transform())?;
         let shadows = Shadows::new(&field, self.rise)?;
         let part = [0, 1].map(|axis| {
-            let first = (own.tile.at[axis] - window.at[axis]) as usize;
+            let first = (own.tile.at[axis] - all.at[axis]) as usize;
             first..first + own.tile.size[axis]
         });
         Ok(shadows.all_lit_in(directions, &part, &rows, monitor)?)
@@ -291,7 +290,7 @@ impl<T: Tiles> Pull<'_, T> {
         &self,
         own: &Own,
         [azimuth, slope]: [f64; 2],
-        read: &mut Vec<(usize, Tile)>,
+        read: &mut Read,
         monitor: &dyn Monitor,
     ) -> Result<Vec<Vec<u64>>, T::Error> {
         // A horizon just below the light; nothing comes from straight below, and none is above infinity.
@@ -303,7 +302,7 @@ impl<T: Tiles> Pull<'_, T> {
         let field = own.field(self.tiles)?;
         let march = March::new(&field, self.rise, 0.0)?;
         march.raise(&own.eyes(&own.window), azimuth, &mut slopes, monitor)?;
-        let mut ways = [Way { azimuth, slopes }];
+        let mut ways = [Way::new(azimuth, field.step(azimuth), slopes)];
         self.raise(own, &mut ways, 0.0, read, monitor)?;
         let [width, height] = own.tile.size;
         let words = width.div_ceil(64);

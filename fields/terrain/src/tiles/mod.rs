@@ -11,18 +11,17 @@
 //! horizon is the largest slope. So windows raise horizons in any order, and edges that two of them share count twice without
 //! harm. A cell is lit if no window raises its horizon to the slope of the light.
 //!
-//! # Which tiles matter
+//! # Which squares matter
 //!
-//! No crossing is higher than the higher end of its edge, and the window of the tile with this end has the edge. So a tile whose
-//! own peaks are nowhere above a horizon can be left out, whatever its neighbours are. As horizons only rise, a tile is judged
-//! once, and nearer ones go first because they mostly hide what is behind them. Of a tile only those squares are read whose peaks
-//! may matter, as rectangles with margins of their own: they are tiles, too.
+//! No crossing is higher than the higher end of its edge, and a window with the cells around this end has the edge. So a square
+//! whose peak is nowhere above a horizon can be left out, whatever is beside it. For horizons, see `rings`; for light, whose rays
+//! climb alike wherever they are, see `light`.
 
 mod light;
+mod rings;
 
 use std::collections::HashSet;
 use std::ops::Range;
-use std::sync::atomic::AtomicBool;
 
 use crate::angles::check_azimuths;
 use crate::march::FAR;
@@ -77,10 +76,12 @@ impl Tile {
         Self::between(at, end).within(whole)
     }
 
-    /// The tile with its margin.
-    fn window(&self, whole: &Self) -> Self {
-        let wider = Self::between(self.at.map(|at| at - 1), self.end().map(|end| end + 1));
-        wider.within(whole)
+    /// The tile with so many cells more on each side.
+    fn wider(&self, cells: i64) -> Self {
+        Self::between(
+            self.at.map(|at| at - cells),
+            self.end().map(|end| end + cells),
+        )
     }
 
     /// Columns or rows from here to another tile, whichever are more.
@@ -113,7 +114,7 @@ pub trait Tiles {
     fn transform(&self) -> [f64; 6];
 
     /// All tiles: each cell with data is in one of them, and none is beside the raster, which is the smallest rectangle around
-    /// them. Small ones, such as of 64 x 64 cells, need fewer cells in all, because what is near is known before what is far.
+    /// them.
     fn tiles(&self) -> &[Tile];
 
     /// Largest height of the cells of a tile, or more than that; minus infinity without data. It is needed for
@@ -194,14 +195,39 @@ pub struct Pulled<V> {
 /// A direction, and the slopes of horizons in it so far.
 struct Way {
     azimuth: f64,
+    step: [f64; 2],
     slopes: Vec<f64>,
+    /// The lowest slope.
+    least: f64,
+}
+
+impl Way {
+    fn new(azimuth: f64, step: [f64; 2], slopes: Vec<f64>) -> Self {
+        let mut way = Self {
+            azimuth,
+            step,
+            slopes,
+            least: 0.0,
+        };
+        way.find_least();
+        way
+    }
+
+    fn find_least(&mut self) {
+        let slopes = self.slopes.iter();
+        self.least = slopes.fold(f64::INFINITY, |least, &slope| match slope < least {
+            true => slope,
+            false => least,
+        });
+    }
 }
 
 impl<T: Tiles> Pull<'_, T> {
     /// Slopes of the horizons of all cells of a tile, one of the raster or any other rectangle of it, row by row for each azimuth
     /// in degrees. They are as of [`March::horizons`], with NaN for cells without data.
     ///
-    /// The memory is 8 bytes for each cell and azimuth, and two tiles. With many azimuths at once, tiles are read fewer times.
+    /// The memory is 8 bytes for each cell and azimuth, and up to 200 MB for what is read. With many azimuths at once, cells are read
+    /// fewer times.
     ///
     /// # Errors
     /// [`Error::Range`] if an azimuth is not finite, the tile is not in the raster, or the raster has more than 2^28 columns or
@@ -226,12 +252,12 @@ impl<T: Tiles> Pull<'_, T> {
             slopes.extend(own.heights.iter().map(start));
             let share = Share(&Share(monitor, [0, 2]), [index, azimuths.len()]);
             march.raise(&own.eyes(&own.window), azimuth, &mut slopes, &share)?;
-            ways.push(Way { azimuth, slopes });
+            ways.push(Way::new(azimuth, field.step(azimuth), slopes));
         }
-        let mut parts = Vec::new();
+        let mut read = Read::default();
         let share = Share(monitor, [1, 2]);
-        self.raise(&own, &mut ways, drop, &mut parts, &share)?;
-        Ok(own.pulled(ways.into_iter().map(|way| way.slopes).collect(), parts))
+        self.raise(&own, &mut ways, drop, &mut read, &share)?;
+        Ok(own.pulled(ways.into_iter().map(|way| way.slopes).collect(), read))
     }
 
     /// Which cells of a tile, one of the raster or any other rectangle of it, get light from each direction: an azimuth in
@@ -257,89 +283,18 @@ impl<T: Tiles> Pull<'_, T> {
         }
         order.sort_by(|&a, &b| directions[a][1].total_cmp(&directions[b][1]));
         let own = Own::new(self.tiles, tile)?;
-        let mut parts = Vec::new();
+        let mut read = Read::default();
         let sorted: Vec<[f64; 2]> = order.iter().map(|&index| directions[index]).collect();
-        let planes = self.light(&own, &sorted, &mut parts, monitor)?;
+        let planes = self.light(&own, &sorted, &mut read, monitor)?;
         let mut values = vec![Vec::new(); directions.len()];
         for (index, plane) in order.into_iter().zip(planes) {
             values[index] = plane;
         }
-        Ok(own.pulled(values, parts))
+        Ok(own.pulled(values, read))
     }
 
-    /// Raises slopes to the horizons that tiles around give, nearest ones first. Adds the parts of tiles that were read.
-    fn raise(
-        &self,
-        own: &Own,
-        ways: &mut [Way],
-        drop: f64,
-        read: &mut Vec<(usize, Tile)>,
-        monitor: &dyn Monitor,
-    ) -> Result<(), T::Error> {
-        let all = self.tiles.tiles();
-        let lowest = own.lowest + self.rise;
-        let least = |numbers: &[f64]| numbers.iter().copied().fold(f64::INFINITY, f64::min);
-        let mut horizons: Vec<f64> = ways.iter().map(|way| least(&way.slopes)).collect();
-        let field = own.field(self.tiles)?;
-        let steps: Vec<[f64; 2]> = ways.iter().map(|way| field.step(way.azimuth)).collect();
-        for (index, &tile) in own.order.iter().enumerate() {
-            let share = Share(monitor, [index, own.order.len()]);
-            share.progress(0, 1);
-            let (eyes, peak) = (own.eyes(&all[tile]), self.tiles.peak(tile));
-            let window = all[tile].window(&own.whole);
-            let first = [0, 1].map(|axis| (window.at[axis] - all[tile].at[axis]) as isize);
-            let lines = steps
-                .iter()
-                .map(|&step| eyes.lines(step, (first, window.size)));
-            let lines: Vec<_> = lines.collect();
-            let matters = |way: usize| lines[way].most(peak - lowest, drop) > horizons[way];
-            let needed: Vec<usize> = (0..ways.len()).filter(|&way| matters(way)).collect();
-            if needed.is_empty() {
-                if monitor.cancelled() {
-                    return Err(Error::Cancelled.into());
-                }
-                continue;
-            }
-            let levels = self.levels(tile)?;
-            let [columns, rows] = levels[0].size();
-            let mut marks = memory::room("marks", columns * rows)?;
-            marks.resize_with(columns * rows, AtomicBool::default);
-            for &way in &needed {
-                let slopes = &mut ways[way].slopes;
-                eyes.mark(
-                    (&levels, &marks),
-                    &lines[way],
-                    [self.rise, drop],
-                    slopes,
-                    &share,
-                )?;
-            }
-            let marks: Vec<bool> = marks.into_iter().map(AtomicBool::into_inner).collect();
-            for window in self.windows(own, tile, &levels[0], &marks) {
-                let heights = self.read(&window)?;
-                read.push((tile, window));
-                let field = HeightField::new(window.size, &heights, self.tiles.transform())?;
-                let march = March::new(&field, self.rise, drop)?;
-                let eyes = own.eyes(&window);
-                let peak = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-                for &way in &needed {
-                    let lines = eyes.lines(steps[way], ([0; 2], window.size));
-                    if lines.most(peak - lowest, drop) > horizons[way] {
-                        let Way { azimuth, slopes } = &mut ways[way];
-                        march.raise(&eyes, *azimuth, slopes, &share)?;
-                    }
-                }
-            }
-            for way in needed {
-                horizons[way] = least(&ways[way].slopes);
-            }
-        }
-        monitor.progress(1, 1);
-        Ok(())
-    }
-
-    /// Peaks of a tile, for stretches of each level.
-    fn levels(&self, tile: usize) -> Result<[Peaks; 3], T::Error> {
+    /// Peaks of the squares of a tile.
+    fn peaks_of(&self, tile: usize) -> Result<Peaks, T::Error> {
         let size = self.tiles.tiles()[tile].size;
         let peaks = match self.tiles.peaks(tile)? {
             Some(peaks) => peaks,
@@ -352,27 +307,45 @@ impl<T: Tiles> Pull<'_, T> {
         let wanted = size.map(|cells| cells.div_ceil(side));
         Error::check_length("columns of peaks of a tile", found[0], wanted[0])?;
         Error::check_length("rows of peaks of a tile", found[1], wanted[1])?;
-        Ok(peaks.levels()?)
-    }
-
-    /// Windows of the squares of a tile that have a mark.
-    fn windows(&self, own: &Own, tile: usize, peaks: &Peaks, marks: &[bool]) -> Vec<Tile> {
-        let (tile, side) = (self.tiles.tiles()[tile], peaks.side());
-        let parts = rectangles(marks, peaks.size()[0]).into_iter();
-        let windows = parts.map(|[columns, rows]| {
-            let place = |axis: usize, at: usize| tile.at[axis] + (at * side) as i64;
-            let at = [place(0, columns.start), place(1, rows.start)];
-            let part = Tile::between(at, [place(0, columns.end), place(1, rows.end)]);
-            part.within(&tile).window(&own.whole)
-        });
-        windows.collect()
+        Ok(peaks)
     }
 
     /// Heights of a part.
-    fn read(&self, part: &Tile) -> Result<Vec<f64>, T::Error> {
+    fn read(&self, part: &Tile, read: &mut Read) -> Result<Vec<f64>, T::Error> {
         let heights = self.tiles.read(*part)?;
         Error::check_length("heights", heights.len(), part.cells())?;
+        read.cells += part.cells() as u64;
         Ok(heights)
+    }
+}
+
+/// What was read: parts of which tiles, and how many cells.
+#[derive(Default)]
+struct Read {
+    tiles: HashSet<usize>,
+    cells: u64,
+}
+
+/// Heights of a part of the raster.
+struct Window {
+    tile: Tile,
+    heights: Vec<f64>,
+}
+
+impl Window {
+    /// The same height everywhere.
+    fn new(tile: Tile, height: f64) -> Result<Self, Error> {
+        let heights = memory::filled("heights", tile.cells(), height)?;
+        Ok(Self { tile, heights })
+    }
+
+    /// Heights that a part of it has.
+    fn put(&mut self, part: &Tile, heights: &[f64]) {
+        let [column, row] = [0, 1].map(|axis| (part.at[axis] - self.tile.at[axis]) as usize);
+        let rows = self.heights.chunks_exact_mut(self.tile.size[0]).skip(row);
+        for (to, from) in rows.zip(heights.chunks_exact(part.size[0])) {
+            to[column..][..part.size[0]].copy_from_slice(from);
+        }
     }
 }
 
@@ -443,7 +416,7 @@ impl Own {
             is_in,
             "a tile in the raster",
         )?;
-        let window = tile.window(&whole);
+        let window = tile.wider(1).within(&whole);
         let around = tiles.read(window)?;
         Error::check_length("heights", around.len(), window.cells())?;
         let mut heights = memory::room("heights", tile.cells())?;
@@ -483,14 +456,13 @@ impl Own {
         }
     }
 
-    /// Answers, and of which tiles parts were read for them.
-    fn pulled<V>(&self, values: Vec<Vec<V>>, parts: Vec<(usize, Tile)>) -> Pulled<V> {
-        let tiles: HashSet<usize> = parts.iter().map(|(tile, _)| *tile).collect();
+    /// Answers, and what was read for them.
+    fn pulled<V>(&self, values: Vec<Vec<V>>, read: Read) -> Pulled<V> {
         let order = self.order.iter().copied();
         Pulled {
             values,
-            read: order.filter(|tile| tiles.contains(tile)).collect(),
-            cells: parts.iter().map(|(_, part)| part.cells() as u64).sum(),
+            read: order.filter(|tile| read.tiles.contains(tile)).collect(),
+            cells: read.cells,
         }
     }
 
