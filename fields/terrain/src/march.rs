@@ -495,7 +495,7 @@ impl Best {
         Self {
             lowest: eyes.fold(f64::INFINITY, |lowest, &eye| lowest.min(eye)),
             most: match square.look.goal {
-                Goal::Marks(_, most) => 4 * most,
+                Goal::Marks(_, most) => most,
                 Goal::Surface(_) => 0,
             },
             found: Vec::new(),
