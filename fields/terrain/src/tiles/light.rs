@@ -157,7 +157,7 @@ impl Beam {
     }
 }
 
-/// Marks the squares of a level that matter to a beam: of a tile, seen from the first eye, those of some columns and rows.
+/// Marks the squares of a level that matter to a beam: of a tile, seen from the first eye, some of its columns and rows.
 fn mark(
     beam: &mut Beam,
     tile: &Tile,
