@@ -255,11 +255,11 @@ impl<T: Tiles> Pull<'_, T> {
                     let first = [0, 1].map(|axis| at(axis, squares[axis].start));
                     let end = [0, 1].map(|axis| at(axis, squares[axis].end));
                     let part = Tile::between(first, end).within(place);
-                    parts.push((tile, part.wider(1).within(&own.whole)));
+                    parts.push((tile, part.with_margin([1; 2], &own.whole)));
                 }
             }
         }
-        let around = |all: Tile, (_, part): &(usize, Tile)| all.around(part);
+        let around = |all: Tile, (_, part): &(usize, Tile)| all.hull(part);
         let all = parts.iter().fold(own.window, around);
         if all.cells() > MOST[0].min(MOST[1] * own.heights.len()) {
             return match directions {

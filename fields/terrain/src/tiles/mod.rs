@@ -71,17 +71,14 @@ impl Tile {
 
     /// The tile with so many columns and rows of the whole around it.
     pub fn with_margin(&self, margin: [i64; 2], whole: &Self) -> Self {
-        let at = [0, 1].map(|axis| self.at[axis].saturating_sub(margin[axis]));
-        let end = [0, 1].map(|axis| self.end()[axis].saturating_add(margin[axis]));
-        Self::between(at, end).within(whole)
+        self.wider(margin).within(whole)
     }
 
-    /// The tile with so many cells more on each side.
-    fn wider(&self, cells: i64) -> Self {
-        Self::between(
-            self.at.map(|at| at - cells),
-            self.end().map(|end| end + cells),
-        )
+    /// The tile with so many columns and rows around it.
+    fn wider(&self, margin: [i64; 2]) -> Self {
+        let at = [0, 1].map(|axis| self.at[axis].saturating_sub(margin[axis]));
+        let end = [0, 1].map(|axis| self.end()[axis].saturating_add(margin[axis]));
+        Self::between(at, end)
     }
 
     /// Columns or rows from here to another tile, whichever are more.
@@ -90,13 +87,6 @@ impl Tile {
         let ways =
             [0, 1].map(|axis| (other.at[axis] - ends[axis]).max(self.at[axis] - others[axis]));
         ways[0].max(ways[1]).max(0)
-    }
-
-    /// The smallest tile around this one and another one.
-    fn around(&self, other: &Self) -> Self {
-        let (ends, others) = (self.end(), other.end());
-        let at = [0, 1].map(|axis| self.at[axis].min(other.at[axis]));
-        Self::between(at, [0, 1].map(|axis| ends[axis].max(others[axis])))
     }
 
     /// Number of cells.
@@ -416,7 +406,7 @@ impl Own {
             is_in,
             "a tile in the raster",
         )?;
-        let window = tile.wider(1).within(&whole);
+        let window = tile.with_margin([1; 2], &whole);
         let around = tiles.read(window)?;
         Error::check_length("heights", around.len(), window.cells())?;
         let mut heights = memory::room("heights", tile.cells())?;

@@ -46,7 +46,7 @@ impl<T: Tiles> Pull<'_, T> {
         let (mut near, reach) = (0, sides[0].max(sides[1]) + 1);
         while near < reach {
             let far = (2 * near).max(FIRST);
-            let ring = own.tile.wider(far).within(&own.whole);
+            let ring = own.tile.with_margin([far; 2], &own.whole);
             let share = Share(monitor, [near as usize, reach as usize]);
             let starts = |axis: usize| (ring.at[axis]..ring.end()[axis]).step_by(PANEL as usize);
             for row in starts(1) {
@@ -86,7 +86,7 @@ impl<T: Tiles> Pull<'_, T> {
         };
         // Edges have ends beside a tile.
         let cells = |tile: &Tile| {
-            let window = tile.wider(1).within(&own.whole);
+            let window = tile.with_margin([1; 2], &own.whole);
             let first = [0, 1].map(|axis| (window.at[axis] - tile.at[axis]) as isize);
             (first, window.size)
         };
@@ -175,15 +175,14 @@ impl<T: Tiles> Pull<'_, T> {
                     let first = square([columns.start, rows.start]);
                     let last = square([columns.end - 1, rows.end - 1]);
                     first
-                        .around(&last)
+                        .hull(&last)
                         .within(&own.whole)
-                        .wider(1)
-                        .within(&own.whole)
+                        .with_margin([1; 2], &own.whole)
                 };
                 // With squares as these, and room for eight eyes beside what is known.
                 let first = square([columns.start, rows.start]);
                 let last = square([columns.end - 1, rows.end - 1]);
-                let all = first.around(&last).wider(SIDE);
+                let all = first.hull(&last).wider([SIDE; 2]);
                 let mut window = Window::new(all, f64::NAN)?;
                 let own_marks: Vec<bool> = rows
                     .clone()
