@@ -1,6 +1,7 @@
 //! A raster that an index describes.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use antumbra_raster::Grid;
 use antumbra_terrain::{self as terrain, Peaks, Tile, Tiles};
@@ -13,7 +14,8 @@ use crate::{Error, Index};
 #[derive(Debug)]
 pub struct Indexed {
     index: Index,
-    peaks: Reader,
+    path: PathBuf,
+    peaks: OnceLock<Reader>,
     store: Store,
     /// Squares of 512 cells of all files, and the largest height in each.
     blocks: Vec<Tile>,
@@ -23,15 +25,18 @@ pub struct Indexed {
 impl Indexed {
     /// Opens the raster of an index, of which it keeps at most about so many bytes of heights that were read.
     ///
+    /// Its files and the file of peaks are opened when something of them is read.
+    ///
     /// # Errors
-    /// The index or its file of peaks cannot be read, or one of both is not of the other.
+    /// The index cannot be read.
     pub fn open(path: &Path, most_bytes: u64) -> Result<Self, Error> {
         let index = Index::read(path)?;
         let blocks: Vec<Tile> = index.files.iter().flat_map(|file| file.blocks()).collect();
         let most = index.files.iter().flat_map(|file| &file.peaks);
         let most = most.map(|peak| peak.map_or(f64::NEG_INFINITY, f64::from));
         Ok(Self {
-            peaks: Reader::open(path, blocks.len(), index.peaks)?,
+            path: path.to_path_buf(),
+            peaks: OnceLock::new(),
             store: Store::new(index.files.len(), most_bytes),
             most: most.collect(),
             blocks,
@@ -87,7 +92,14 @@ impl Tiles for Indexed {
     }
 
     fn peaks(&self, tile: usize) -> Result<Option<Peaks>, Error> {
-        self.peaks.read(tile, self.blocks[tile].size).map(Some)
+        let peaks = match self.peaks.get() {
+            Some(peaks) => peaks,
+            None => {
+                let peaks = Reader::open(&self.path, self.blocks.len(), self.index.peaks)?;
+                self.peaks.get_or_init(|| peaks)
+            }
+        };
+        peaks.read(tile, self.blocks[tile].size).map(Some)
     }
 
     fn read(&self, part: Tile) -> Result<Vec<f64>, Error> {

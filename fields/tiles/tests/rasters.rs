@@ -179,7 +179,8 @@ fn indices_that_are_not_of_these_files_are_refused() {
     assert!(error.contains("record 0 is damaged"), "{error}");
     assert!(indexed.peaks(1).is_ok());
     fs::write(&peaks, &whole[..whole.len() - 1]).expect("a file");
-    let error = Indexed::open(&path, 0).expect_err("short").to_string();
+    let indexed = Indexed::open(&path, 0).expect("an index");
+    let error = indexed.peaks(0).expect_err("short").to_string();
     assert!(error.contains("it is not of"), "{error}");
     // A file that is another one since then.
     fs::write(&peaks, &whole).expect("a file");

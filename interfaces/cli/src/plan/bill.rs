@@ -11,10 +11,10 @@ use crate::bake::tile::TileWork;
 use crate::bake::{BakeCommand, run_tile};
 use crate::exit::{Failure, Loudness, quietly};
 
-/// Cells on a side of the squares that are measured, and seconds that the larger one may take.
+/// Cells on a side of the squares that are measured, and seconds that the larger ones may take.
 const SMALL: usize = 96;
 const SAMPLE: usize = 512;
-const LONG: f64 = 2.0;
+const LONG: f64 = 3.0;
 
 /// Seconds to write and to read a number, about.
 const WRITTEN: f64 = 2e-8;
@@ -76,11 +76,13 @@ impl Rates {
             .map(|rate| rate * (tile.size[0] * tile.size[1] * steps) as f64)
     }
 
-    /// Seconds of a tile.
+    /// Seconds of a tile, which is computed part by part.
     pub fn tile(&self, tile: &Tile) -> Option<f64> {
         let [columns, rows] = tile.size.map(|cells| cells as f64);
+        let [across, down] = tile.size.map(|cells| cells.div_ceil(PART) as f64);
+        let border = 2.0 * (columns * down + rows * across);
         self.tile
-            .map(|[cell, border]| cell * columns * rows + border * 2.0 * (columns + rows))
+            .map(|[cell, along]| cell * columns * rows + along * border)
     }
 
     /// Most bytes of memory of a tile.
@@ -97,36 +99,47 @@ impl Rates {
     }
 }
 
-/// A square in the middle of the file in the middle, which has data.
-fn sample(raster: &Indexed, side: usize) -> Tile {
+/// Places that are measured.
+const PLACES: usize = 3;
+
+/// A square in one of some files that are far from each other, each time elsewhere in the file.
+fn sample(raster: &Indexed, side: usize, place: usize) -> Tile {
     let files = &raster.index().files;
-    let middle = &files[files.len() / 2];
-    let size = middle.size.map(|cells| cells.min(side));
+    let file = &files[(2 * place + 1) * files.len() / (2 * PLACES)];
+    let size = file.size.map(|cells| cells.min(side));
+    let first =
+        |axis: usize| file.at[axis] + (place + 1) * (file.size[axis] - size[axis]) / (PLACES + 1);
     Tile {
-        at: [0, 1].map(|axis| (middle.at[axis] + (middle.size[axis] - size[axis]) / 2) as i64),
+        at: [0, 1].map(|axis| first(axis) as i64),
         size,
     }
 }
 
-/// Seconds for each cell, and for each one along the border, by two squares.
+/// Seconds for each cell, and for each one along the border, by squares of two sizes.
 fn of_tile(bake: &BakeCommand, raster: &Indexed, memory: MemorySize) -> Result<[f64; 2], Failure> {
+    // Seconds, cells and cells along borders of all places.
     let measure = |side: usize| {
-        let tile = sample(raster, side);
-        let work = TileWork::new(raster, tile, (None, &[]));
-        let start = thread_seconds();
-        quietly(Loudness::Quiet, || run_tile(bake.args().0, memory, &work))?;
-        let [columns, rows] = tile.size.map(|cells| cells as f64);
-        Ok::<_, Failure>((
-            thread_seconds() - start,
-            columns * rows,
-            2.0 * (columns + rows),
-        ))
+        let mut sum = [0.0; 3];
+        for place in 0..PLACES {
+            let tile = sample(raster, side, place);
+            let work = TileWork::new(raster, tile, (None, &[]));
+            let start = thread_seconds();
+            quietly(Loudness::Quiet, || run_tile(bake.args().0, memory, &work))?;
+            let [columns, rows] = tile.size.map(|cells| cells as f64);
+            let found = [
+                thread_seconds() - start,
+                columns * rows,
+                2.0 * (columns + rows),
+            ];
+            sum = [0, 1, 2].map(|at| sum[at] + found[at]);
+        }
+        Ok::<[f64; 3], Failure>(sum)
     };
     // What is only read once is read before.
     measure(SMALL)?;
-    let (first, cells, border) = measure(SMALL)?;
+    let [first, cells, border] = measure(SMALL)?;
     let side = SMALL as f64 * (LONG / first.max(1e-6)).sqrt();
-    let (second, more, longer) = measure(side.clamp(2.0 * SMALL as f64, SAMPLE as f64) as usize)?;
+    let [second, more, longer] = measure(side.clamp(2.0 * SMALL as f64, SAMPLE as f64) as usize)?;
     let area = cells * longer - more * border;
     // Of files that are no larger than the small square there is one measure only.
     if area.abs() < 1.0 {
@@ -139,7 +152,7 @@ fn of_tile(bake: &BakeCommand, raster: &Indexed, memory: MemorySize) -> Result<[
 
 /// Seconds for each cell of a sweep, and of an azimuth that is pulled.
 fn of_directions(raster: &Indexed, directions: &[Direction]) -> Result<(f64, f64), Failure> {
-    let tile = sample(raster, SAMPLE);
+    let tile = sample(raster, SAMPLE, PLACES / 2);
     let heights = raster.read(tile)?;
     let transform = raster.index().transform_at(tile.at);
     let field = HeightField::new(tile.size, &heights, transform).map_err(Error::from)?;

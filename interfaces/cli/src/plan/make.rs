@@ -90,6 +90,9 @@ pub fn make(args: &PlanArgs, memory: MemorySize) -> Result<(), Failure> {
             giga(*bytes_written)
         );
     }
+    if *cells > 0 && core_hours.is_none() {
+        words += "; how long it takes is not estimated, since its files are not here";
+    }
     if let (Some(hours), Some(memory)) = (core_hours, memory) {
         words += &format!(
             "; about {} of one core, and at most {:.2} GB of memory for a task",
