@@ -76,7 +76,7 @@ impl Index {
     /// data in a cell, the first one has the cell.
     ///
     /// # Errors
-    /// A file cannot be read, its cells do not fall on those of the others, heights of files have different units, or no cell has data;
+    /// A file cannot be read, its cells do not fall on the cells of the others, heights of files have different units, or no cell has data;
     /// [`antumbra_terrain::Error::Cancelled`].
     pub fn make(files: &[PathBuf], path: &Path, monitor: &dyn Monitor) -> Result<Self, Error> {
         let index = survey::survey(files, path, monitor)?;

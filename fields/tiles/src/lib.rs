@@ -1,7 +1,7 @@
 //! Height rasters of many files that are larger than memory.
 //!
 //! An [`Index`] says which files a raster has, where their cells are, and how high the surface is at most in each square of 512 cells.
-//! An [`Indexed`] raster reads parts of it, and is what [`Pull`](antumbra_terrain::Pull) asks for tiles.
+//! An [`Indexed`] raster reads parts of it, and gives tiles to [`Pull`](antumbra_terrain::Pull).
 //!
 //! ```
 //! use antumbra_raster::{Grid, Quantity, write};

@@ -95,7 +95,7 @@ impl Terrain {
         })
     }
 
-    /// Writes values of all cells, plane by plane; of a tile, those of its own cells.
+    /// Writes values of all cells, plane by plane; of a tile, only its own cells.
     pub fn write(
         &self,
         path: &Path,

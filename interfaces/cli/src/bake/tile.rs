@@ -1,6 +1,6 @@
 //! Tiles of a raster of many files, with the bits of the whole.
 //!
-//! Lights, and azimuths that are no steps between cells, are pulled: a tile asks for those parts of others that may matter. Steps are
+//! Lights, and azimuths that are no steps between cells, are pulled: a tile reads the parts of others that may matter. Steps are
 //! pushed: a tile takes the hulls of the lines that enter it from the tiles ahead, and gives on those that leave it. Tiles of all
 //! steps of a quarter of the compass follow each other in one order, so that a tile has four such tasks.
 
@@ -75,9 +75,9 @@ pub fn quarter([columns, rows]: [i32; 2]) -> usize {
 pub struct TileWork<'a> {
     pub raster: &'a Indexed,
     pub tile: Tile,
-    /// A quarter of which the steps are swept, instead of what the command asks for, and the file to write.
+    /// A quarter of which the steps are swept, instead of the answers of the command, and the file to write.
     pub quarter: Option<(usize, &'a Path)>,
-    /// Files of the sweeps of this tile, quarter by quarter, or for a sweep of those of the tiles ahead.
+    /// Files of the sweeps of this tile, quarter by quarter, or for a sweep the files of the tiles ahead.
     pub sweeps: &'a [PathBuf],
     /// Why other tiles cannot be read.
     failure: Mutex<Option<tiles::Error>>,
@@ -158,7 +158,7 @@ impl<'a> TileWork<'a> {
         answer(&field.map_err(Error::from)?, &eye, Tile { at, ..window })
     }
 
-    /// Which of the cells of the window get light from each of some directions, as [`FieldSunJob`](antumbra_bake::FieldSunJob) asks.
+    /// Which of the cells of the window get light from each of some directions, for [`FieldSunJob`](antumbra_bake::FieldSunJob).
     pub fn lit(
         &self,
         rise: f64,
@@ -226,7 +226,7 @@ impl<'a> TileWork<'a> {
         Ok(atomic_write(path, |file| Sweeps::write(file, &found))?)
     }
 
-    /// Angles of the cells of the window, in the direction of this number. Those of steps are NaN beside the tile.
+    /// Angles of the cells of the window, in the direction of this number. Along steps they are NaN beside the tile.
     pub fn plane<'d>(
         &'d self,
         directions: &'d [Direction],

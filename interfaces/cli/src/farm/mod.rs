@@ -263,7 +263,7 @@ pub fn check_flags(flags: &[String]) -> Result<(), Failure> {
     ];
     match ours.iter().find(|(_, given)| *given) {
         Some((flag, _)) => Err(Failure::Usage(format!(
-            "{flag} cannot be a flag of every task, which has its own"
+            "{flag} is set for every task by itself"
         ))),
         None => Ok(()),
     }

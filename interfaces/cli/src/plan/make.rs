@@ -48,6 +48,12 @@ pub fn make(args: &PlanArgs, memory: MemorySize) -> Result<(), Failure> {
         levels: Vec::new(),
         bill: Bill::default(),
     };
+    let name = args.command.first().map_or("", |name| name);
+    if name != "render" && !BakeCommand::NAMES.contains(&name) {
+        let names = BakeCommand::NAMES.join(", ");
+        let reason = format!("{name}: a plan is for render, {names}");
+        return Err(Failure::Usage(reason));
+    }
     let tasks = match is_index(&args.scene) {
         true => of_tiles(args, memory, &mut head)?,
         false => of_shards(args, &mut head)?,

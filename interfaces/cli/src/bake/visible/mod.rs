@@ -51,7 +51,7 @@ impl Shown {
         }
     }
 
-    /// Unit in files, once that of lengths is settled.
+    /// Unit in files, once the unit of lengths is settled.
     fn unit(self, args: &VisibleArgs) -> String {
         match self {
             Self::SeenBy => String::new(),
