@@ -54,5 +54,5 @@ pub use memory::{BadSize, MemorySize};
 pub use stage::{
     OwnStage, Sky, Stage, Sun, Up, scene_of_mesh, scene_of_model, set_ground, set_stage,
 };
-pub use terrain::{Heights, load_heights};
+pub use terrain::{Heights, load_heights, raster_warnings};
 pub use up::Upright;

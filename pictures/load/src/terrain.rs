@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use antumbra_mesh::{Warning, plain_material};
-use antumbra_raster::{Crs, Mosaic, Purpose, Raster, Tiles, read_all, unit_name};
+use antumbra_raster::{Crs, Grid, Mosaic, Purpose, Raster, Tiles, read_all, unit_name};
 use antumbra_scene::TriangleMesh;
 use glam::DVec3;
 
@@ -19,7 +19,7 @@ pub fn load(paths: &[PathBuf], limit: u64, origin: DVec3) -> Result<Loaded, Erro
         inputs,
         tiles,
     } = read_all(paths, limit, Purpose::Mesh)?;
-    let warnings = warnings(&paths[0], &raster);
+    let warnings = raster_warnings(&paths[0], &raster.grid, raster.height_factor);
     let surface = raster.mesh(origin.to_array());
     let cells = raster.into_cells(&surface);
     let mesh = TriangleMesh {
@@ -65,7 +65,8 @@ pub fn load_heights(paths: &[PathBuf], options: &Options) -> Result<Heights, Err
         inputs,
         tiles,
     } = read_all(paths, options.max_memory.bytes(), Purpose::Values)?;
-    let warnings = paths.first().map(|path| warnings(path, &raster));
+    let of = |path: &PathBuf| raster_warnings(path, &raster.grid, raster.height_factor);
+    let warnings = paths.first().map(of);
     let warnings = warnings.unwrap_or_default();
     if options.strict && !warnings.is_empty() {
         return Err(Error::Strict(warnings));
@@ -105,9 +106,8 @@ fn ends(raster: &Raster) -> impl Iterator<Item = [f64; 3]> {
     })
 }
 
-/// Warnings about a raster that seems not to be in one unit of length.
-fn warnings(path: &Path, raster: &Raster) -> Vec<Warning> {
-    let grid = &raster.grid;
+/// Warnings about a raster that seems not to be in one unit of length. `height_factor` is as in [`Raster`].
+pub fn raster_warnings(path: &Path, grid: &Grid, height_factor: Option<f64>) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let mut warn = |text: String| {
         let place = path.display().to_string();
@@ -120,7 +120,7 @@ fn warnings(path: &Path, raster: &Raster) -> Vec<Warning> {
         ));
     }
     let ground = grid.crs.as_ref().and_then(Crs::metres).unwrap_or(1.0);
-    match raster.height_factor {
+    match height_factor {
         Some(factor) if (factor - 1.0).abs() > 1e-9 => warn(format!(
             "heights are in {} and coordinates in {}: heights are multiplied by {factor:.6}",
             unit_name(factor * ground),

@@ -31,6 +31,9 @@ pub struct Terrain {
     own: Option<Tile>,
 }
 
+/// Bytes of a cell of a raster that is read as a whole, with what is computed of it.
+const WHOLE: u64 = 16;
+
 /// Whether a scene is a height raster that lies as it does on a map.
 pub fn is_terrain(scene: &[PathBuf], up: Option<UpAxis>) -> bool {
     is_raster(scene) && up.is_none_or(|up| up == UpAxis::Z)
@@ -47,6 +50,15 @@ impl Terrain {
             let raster = tile::open(index, memory)?;
             files.reads("the index", index)?;
             let whole = raster.index().whole();
+            let [columns, rows] = whole.size.map(|cells| cells as u64);
+            if columns.saturating_mul(rows).saturating_mul(WHOLE) > memory.bytes() {
+                let reason = format!(
+                    "{columns} x {rows} cells do not fit into {memory} of memory; compute them in tiles: antumbra plan {} -o \
+                     plan.jsonl COMMAND",
+                    index.display()
+                );
+                return Err(Failure::scene(&name, reason));
+            }
             return Self::of_tile(&raster, &whole, name);
         }
         let heights = scenes::load_heights(scene, memory)?;

@@ -80,7 +80,12 @@ pub fn make(args: &PlanArgs, memory: MemorySize) -> Result<(), Failure> {
         bytes_read,
         bytes_written,
     } = &head.bill;
-    let mut words = format!("{}: {} tasks", args.output.display(), count(*tasks as u64));
+    let things = if *tasks == 1 { "task" } else { "tasks" };
+    let mut words = format!(
+        "{}: {} {things}",
+        args.output.display(),
+        count(*tasks as u64)
+    );
     if head.levels.len() > 1 {
         words += &format!(
             " in {} levels, of which each needs the one before",
@@ -125,7 +130,10 @@ pub fn parse(line: Vec<String>, more: &[&str]) -> Result<Command, Failure> {
     let line = line
         .into_iter()
         .chain(more.iter().map(|&flag| flag.to_owned()));
-    let cli = Cli::try_parse_from(line).map_err(|error| Failure::Usage(error.to_string()))?;
+    let cli = Cli::try_parse_from(line).map_err(|error| {
+        let text = error.to_string();
+        Failure::usage(text.strip_prefix("error: ").unwrap_or(&text))
+    })?;
     cli.command
         .ok_or_else(|| Failure::usage("a plan needs a command"))
 }
@@ -150,10 +158,11 @@ fn settle_files(bake: &BakeCommand, command: &mut [String]) -> Result<Vec<Input>
             "{flag}: every task of a plan writes one file only"
         )));
     }
-    if bake.args().0.shared().2.is_some() {
-        return Err(Failure::usage(
-            "--json: every task of a plan writes one file only",
-        ));
+    let (_, outputs, json, _) = bake.args().0.shared();
+    if outputs.len() != 1 || json.is_some() {
+        let reason =
+            "--output, --json: every task of a plan writes one file only, which it names by itself";
+        return Err(Failure::usage(reason));
     }
     let mut inputs = Vec::new();
     for path in read.into_iter().filter_map(|(_, path)| path) {

@@ -164,9 +164,7 @@ impl Runner<'_> {
             version: VERSION.to_owned(),
         };
         let text = serde_json::to_string(&receipt).map_err(Failure::work)?;
-        atomic_write(&plan.receipt_path(&task.id), |file| {
-            writeln!(file, "{text}")
-        })?;
+        atomic_write(plan.receipt_path(&task.id), |file| writeln!(file, "{text}"))?;
         Ok(())
     }
 

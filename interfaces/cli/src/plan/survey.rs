@@ -1,7 +1,8 @@
 //! `antumbra index`: height rasters of many files as one.
 
 use antumbra_lab::count;
-use antumbra_tiles::Index;
+use antumbra_load::raster_warnings;
+use antumbra_tiles::{Index, Indexed};
 
 use crate::args::IndexArgs;
 use crate::bake::tile::is_index;
@@ -26,6 +27,10 @@ pub fn survey(args: &IndexArgs) -> Result<(), Failure> {
     let progress = Progress::new(name.as_ref());
     let index = Index::make(&rasters, output, &progress)?;
     progress.finish();
+    let grid = Indexed::open(output, 0)?.grid(&index.whole())?;
+    for warning in raster_warnings(&rasters[0], &grid, index.height_factor) {
+        tell(format_args!("{warning}"));
+    }
     let mut text = format!(
         "{name}: {} files are one raster of {} x {} cells, {} with data",
         index.files.len(),
