@@ -20,13 +20,15 @@ use glam::DVec3;
 
 use super::site::Asked;
 use crate::exit::Failure;
+use crate::input::check_answers;
 use crate::output::is_one_of;
 
 /// Part of the memory that heights of other tiles may take.
 const KEPT: u64 = 4;
 
-/// Azimuths that are pulled together, which take 8 bytes for each cell.
+/// Azimuths that are pulled together, at most, and bytes of their slopes: 8 for each cell.
 const TOGETHER: usize = 16;
+const SLOPES: usize = 256 << 20;
 
 /// Whether a file is an index, by its name.
 pub fn is_index(path: &Path) -> bool {
@@ -150,6 +152,7 @@ impl<'a> TileWork<'a> {
         }
         let eye = around(observer.place).within(&index.whole());
         let hull = window.hull(&eye);
+        check_answers("viewshed", 9 * hull.size[0] as u64 * hull.size[1] as u64)?;
         let heights = self.raster.read(hull)?;
         let field = HeightField::new(hull.size, &heights, index.transform_at(hull.at));
         let place = [0, 1].map(|axis| observer.place[axis] - hull.at[axis] as f64);
@@ -246,13 +249,15 @@ impl<'a> TileWork<'a> {
                 Direction::Step(_) => None,
             };
             let next = (index..directions.len()).filter(|at| azimuth(at).is_some());
-            let next: Vec<usize> = next.take(TOGETHER).collect();
+            let window = self.window();
+            let together = SLOPES / (8 * window.size[0] * window.size[1]);
+            let next: Vec<usize> = next.take(together.clamp(1, TOGETHER)).collect();
             let azimuths: Vec<f64> = next.iter().filter_map(azimuth).collect();
             let pull = Pull {
                 tiles: self.raster,
                 rise,
             };
-            let found = pull.horizons(&self.window(), &azimuths, 0.0, monitor)?;
+            let found = pull.horizons(&window, &azimuths, 0.0, monitor)?;
             let angles = found.values.into_iter();
             let angles = angles.map(|slopes| slopes.into_iter().map(degrees).collect::<Vec<f32>>());
             let mut pulled = pulled.borrow_mut();

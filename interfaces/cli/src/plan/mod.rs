@@ -13,8 +13,9 @@ mod merge;
 mod run;
 mod survey;
 
-use std::fs::{self, File};
-use std::io::{BufRead, BufReader, Read};
+use std::collections::HashMap;
+use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
@@ -119,6 +120,8 @@ pub struct Plan {
     path: PathBuf,
     head: Head,
     tasks: Vec<Task>,
+    /// Tasks whose results these need.
+    needed: HashMap<String, Task>,
 }
 
 /// What there is of a task.
@@ -136,66 +139,61 @@ enum State {
 }
 
 impl Plan {
-    /// Reads a plan; with names of tasks or their numbers only these.
+    /// Reads a plan; with names of tasks or their numbers only these, and the tasks that they need.
     fn read(path: &Path, wanted: &[String]) -> Result<Self, Failure> {
         let bad = |line: usize, reason: String| {
             Failure::Data(format!("{}:{}: {reason}", path.display(), line + 1))
         };
-        let file = File::open(path);
-        let file = file.map_err(|error| Failure::Usage(format!("{}: {error}", path.display())))?;
-        let mut lines = BufReader::new(file).lines().enumerate();
-        let first = lines
-            .next()
-            .and_then(|(_, line)| line.ok())
-            .unwrap_or_default();
-        let head: Head = serde_json::from_str(&first)
+        let text = fs::read_to_string(path);
+        let text = text.map_err(|error| Failure::Usage(format!("{}: {error}", path.display())))?;
+        let (first, rest) = text.split_once('\n').unwrap_or((&text, ""));
+        let head: Head = serde_json::from_str(first)
             .map_err(|error| bad(0, format!("wanted a plan of `antumbra plan`: {error}")))?;
         if head.schema != PLAN {
-            return Err(bad(
-                0,
-                format!("found the schema `{}`, wanted {PLAN}", head.schema),
-            ));
+            let reason = format!("found the schema `{}`, wanted {PLAN}", head.schema);
+            return Err(bad(0, reason));
         }
-        let mut tasks = Vec::new();
-        let starts: Vec<String> = wanted
-            .iter()
-            .map(|id| format!("{{\"id\":\"{id}\","))
-            .collect();
-        let mut count = 0;
-        for (number, line) in lines {
-            let line = line.map_err(|error| bad(number, error.to_string()))?;
-            count += 1;
-            // Other lines need not be understood, since there may be many of them.
-            let is_wanted = |(id, start): (&String, &String)| {
-                line.starts_with(start) || id.parse() == Ok(number - 1)
+        let lines: Vec<&str> = rest.lines().collect();
+        if lines.len() != head.bill.tasks {
+            let (found, wanted) = (lines.len(), head.bill.tasks);
+            let reason = format!("found {found} tasks, wanted {wanted}; it is cut short");
+            return Err(bad(found, reason));
+        }
+        let task = |number: usize| {
+            let task = serde_json::from_str::<Task>(lines[number]);
+            task.map_err(|error| bad(number + 1, error.to_string()))
+        };
+        // Other lines need not be understood, since there may be many of them.
+        let find = |id: &String| {
+            let start = format!("{{\"id\":\"{id}\",");
+            let found = lines.iter().position(|line| line.starts_with(&start));
+            let missing = || {
+                Failure::Usage(format!(
+                    "{}: there is no task {id}; tasks have ids, and the numbers 0 to {}",
+                    path.display(),
+                    lines.len().saturating_sub(1)
+                ))
             };
-            if wanted.is_empty() || wanted.iter().zip(&starts).any(is_wanted) {
-                let task = serde_json::from_str(&line);
-                tasks.push(task.map_err(|error| bad(number, error.to_string()))?);
+            let number = || id.parse().ok().filter(|&number| number < lines.len());
+            task(found.or_else(number).ok_or_else(missing)?)
+        };
+        let tasks: Vec<Task> = match wanted {
+            [] => (0..lines.len()).map(task).collect::<Result<_, _>>()?,
+            wanted => wanted.iter().map(find).collect::<Result<_, _>>()?,
+        };
+        let mut needed = HashMap::new();
+        for id in tasks.iter().flat_map(|task| &task.after) {
+            if !needed.contains_key(id) {
+                needed.insert(id.clone(), find(id)?);
             }
         }
-        if count != head.bill.tasks {
-            let reason = format!(
-                "found {count} tasks, wanted {}; it is cut short",
-                head.bill.tasks
-            );
-            return Err(bad(count, reason));
-        }
         let path = path.to_path_buf();
-        let plan = Self { path, head, tasks };
-        let is_there = |id: &&String| {
-            let mut tasks = plan.tasks.iter();
-            id.parse::<usize>().is_ok_and(|number| number < count)
-                || tasks.any(|task| task.id == **id)
-        };
-        match wanted.iter().find(|id| !is_there(id)) {
-            None => Ok(plan),
-            Some(id) => Err(Failure::Usage(format!(
-                "{}: there is no task {id}; tasks have the numbers 0 to {}, and ids in each line",
-                plan.path.display(),
-                count.saturating_sub(1)
-            ))),
-        }
+        Ok(Self {
+            path,
+            head,
+            tasks,
+            needed,
+        })
     }
 
     /// A file beside the plan.

@@ -1,7 +1,9 @@
 //! `antumbra run`: one task of a plan, or all.
 
 use std::cell::OnceCell;
-use std::fs;
+use std::collections::hash_map::RandomState;
+use std::fs::{self, File};
+use std::hash::{BuildHasher, Hasher};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -70,7 +72,9 @@ struct Scratch(PathBuf);
 
 impl Scratch {
     fn new(folder: &Path, id: &str) -> Result<Self, Failure> {
-        let path = folder.join(format!(".{id}.{}", std::process::id()));
+        // Machines that share the folder may have processes of the same number.
+        let number = RandomState::new().build_hasher().finish();
+        let path = folder.join(format!(".{id}.{number:016x}"));
         fs::create_dir_all(&path).map_err(Failure::work)?;
         Ok(Self(path))
     }
@@ -86,14 +90,22 @@ impl Drop for Scratch {
 impl Runner<'_> {
     fn run(&self, task: &Task) -> Result<(), Failure> {
         let (plan, start) = (self.plan, Instant::now());
-        for id in &task.after {
-            if plan.receipt(id).is_none() {
-                return Err(Failure::Work(format!(
-                    "{}: it needs the result of {id}, which is not there; run that first: antumbra run {} --task {id}",
-                    task.id,
-                    plan.path.display()
-                )));
-            }
+        for (id, needed) in task
+            .after
+            .iter()
+            .filter_map(|id| plan.needed.get_key_value(id))
+        {
+            let state = match plan.state(needed)? {
+                State::Done => continue,
+                State::Missing => "is not there",
+                State::Stale => "is of another plan",
+                State::Disagreeing => "is damaged",
+            };
+            return Err(Failure::Work(format!(
+                "{}: it needs the result of {id}, which {state}; run that first: antumbra run {} --task {id}",
+                task.id,
+                plan.path.display()
+            )));
         }
         for input in &task.inputs {
             let path = plan.beside(&input.path);
@@ -108,10 +120,17 @@ impl Runner<'_> {
         }
         let result = plan.result(task);
         let scratch = Scratch::new(&plan.folder(), &task.id)?;
-        let own = match task.part {
-            // Its unfinished work is in the file itself, with which the same task goes on.
-            Part::Shard(_) => result.clone(),
-            _ => scratch.0.join(&task.output),
+        // The unfinished work of a share has a name of its own, with which the same task goes on, unless it goes on elsewhere.
+        let lock = match task.part {
+            Part::Shard(_) => Some(File::create(
+                plan.folder().join(format!(".{}.lock", task.id)),
+            )),
+            _ => None,
+        };
+        let lock = lock.transpose().map_err(Failure::work)?;
+        let own = match lock.as_ref().is_some_and(|lock| lock.try_lock().is_ok()) {
+            true => plan.folder().join(format!("unfinished.{}", task.output)),
+            false => scratch.0.join(&task.output),
         };
         let mut inputs = task.inputs.clone();
         match task.part {
@@ -147,9 +166,7 @@ impl Runner<'_> {
                 )));
             }
         }
-        if own != result {
-            fs::rename(&own, &result).map_err(Failure::work)?;
-        }
+        fs::rename(&own, &result).map_err(Failure::work)?;
         let receipt = Receipt {
             schema: RECEIPT.to_owned(),
             task: task.id.clone(),

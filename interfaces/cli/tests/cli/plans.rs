@@ -287,6 +287,54 @@ fn tasks_are_done_once_and_what_is_lost_is_done_again() {
 }
 
 #[test]
+fn sweeps_that_a_task_needs_are_checked() {
+    let place = Place::empty();
+    raster(&place, &mut Rng::new(9));
+    place.run(&["index", "parts", "-o", "all.index"]).expect(0);
+    let job = [
+        "horizon",
+        "--cells",
+        "--azimuths",
+        "lattice:8",
+        "--show",
+        "sky-view",
+    ];
+    let head = ["plan", "all.index", "-o", "plan.jsonl", "--tile", "60"];
+    place.run(&[&head[..], &job].concat()).expect(0);
+    let all = tasks(&place.path("plan.jsonl"));
+    let (id, after) = all
+        .iter()
+        .find(|(_, after)| after.len() == 1)
+        .expect("a task");
+    let run = |code| {
+        place
+            .run(&["run", "plan.jsonl", "--task", id])
+            .expect(code)
+            .stderr
+    };
+    assert!(run(1).contains(&format!(
+        "needs the result of {}, which is not there",
+        after[0]
+    )));
+    place.run(&["run", "plan.jsonl"]).expect(0);
+    let [result, receipt] =
+        [".sweep", ".receipt.json"].map(|end| format!("plan.jsonl.results/{}{end}", after[0]));
+    let text = fs::read_to_string(place.path(&receipt)).expect("a receipt");
+    let bytes = fs::read(place.path(&result)).expect("a sweep");
+    fs::remove_file(place.path(&format!("plan.jsonl.results/{id}.receipt.json"))).expect("removed");
+    // A sweep with other angles, and one of another plan.
+    let mut other = bytes.clone();
+    *other.last_mut().expect("a byte") ^= 1;
+    place.write(&result, other);
+    assert!(run(1).contains("which is damaged"));
+    place.write(&result, bytes);
+    place.write(&receipt, text.replace("\"key\":\"", "\"key\":\"0"));
+    assert!(run(1).contains("which is of another plan"));
+    place.write(&receipt, text);
+    run(0);
+}
+
+#[test]
 fn other_inputs_are_refused_by_name() {
     let place = Place::empty();
     sunny(&place);
