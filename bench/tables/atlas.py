@@ -94,7 +94,21 @@ def seconds():
     return ["", "", *(TERRAINS[terrain] for terrain in chosen)], table
 
 
+def rims():
+    """What a rim around each chunk costs: horizons of azimuths between the multiples of 45 degrees."""
+    found = {rim: rows("horizon")[f"rim of {rim} cells"] for rim in (100, 500)}
+    table = []
+    for terrain, name in TERRAINS.items():
+        if not any("failed" in each[terrain] for each in found.values()):
+            of = [each[terrain]["others"] for each in found.values()]
+            cells = [[f"{percent(row['over 0.1'])} / {percent(row['over 1'])}", f"{row['most']:.1f}"] for row in of]
+            table.append([name, *cells[0], *cells[1]])
+    heads = [[f"rim of {rim}, over 0.1 / 1 degree", "largest, degrees"] for rim in found]
+    return ["", *heads[0], *heads[1]], table
+
+
 TABLES = {
+    "atlas-rims": rims,
     "atlas-checks": checks,
     "atlas-horizons": horizons,
     "atlas-horizon-means": horizon_means,

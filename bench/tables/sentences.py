@@ -401,12 +401,8 @@ SOURCES = {
         ("takes about 350 bytes, as `sys.getsizeof(tree)` counts", "defined"),
     ],
     "docs/src/python/many-machines.md": [
-        ("starts\n  about 0.3 CPU seconds", "bench/record/zen3-2026-11-26-python-machines.txt", "10.66"),
-        ("are 1.43 times as fast as one thread with tasks of 1.2 s", "bench/record/xeon-2026-11-26-python-machines.txt", "| 1.197 | 1.26 | 1.22 | 1.26 | 1.43 |"),
-        ("24 tasks of 1.2 s are 1.55 times as fast", "bench/record/xeon-2026-11-26-python-machines.txt", "two workers, 1.55 times"),
-        ("Two processes without it are 2.14 times as fast", "bench/record/xeon-2026-11-26-python-machines.txt", "at once: 2.14 times"),
-        ("and 1.34 and 1.51 times, in two runs, with tasks of 3.6 s", "bench/record/xeon-2026-11-26-python-machines.txt", "| 3.646 | 0.99 | 0.92 | 0.87 | 1.51 |"),
-        ("with tasks of 0.03 s, are about even at 0.3 s, and can win 1.5 times and more from 3 s on", "bench/record/zen3-2026-11-26-python-machines.txt", "3.126 | 1.30"),
+        ("a rim around chunks of 256 x 256 cells", "bench/atlas/tools.py", "chunks of 256 x 256 cells"),
+        ("wrong by more than 0.1 and 1 degree", "bench/tables/atlas.py", "over 0.1"),
     ],
     BAKING: [
         ("a texture of 2048 x 2048 texels", "setting"),
