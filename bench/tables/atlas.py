@@ -6,6 +6,8 @@ import os
 from tables.texts import RECORDS
 
 ATLAS = "xeon-2026-11-28-atlas.json"
+MOUNTAINS = "xeon-2026-11-29-rims.json"
+RIMS = (100, 500)
 TERRAINS = {"tower": "tower", "town": "town", "old-town": "old town", "ridge": "ridge", "alps": "alps", "new-zealand": "New Zealand"}
 
 
@@ -95,16 +97,20 @@ def seconds():
 
 
 def rims():
-    """What a rim around each chunk costs: horizons of azimuths between the multiples of 45 degrees."""
-    found = {rim: rows("horizon")[f"rim of {rim} cells"] for rim in (100, 500)}
-    table = []
-    for terrain, name in TERRAINS.items():
-        if not any("failed" in each[terrain] for each in found.values()):
-            of = [each[terrain]["others"] for each in found.values()]
-            cells = [[f"{percent(row['over 0.1'])} / {percent(row['over 1'])}", f"{row['most']:.1f}"] for row in of]
-            table.append([name, *cells[0], *cells[1]])
-    heads = [[f"rim of {rim}, over 0.1 / 1 degree", "largest, degrees"] for rim in found]
-    return ["", *heads[0], *heads[1]], table
+    """What a rim around each chunk costs: horizons in azimuths between the multiples of 45 degrees."""
+    lines = {}
+    for rim in RIMS:
+        found = [(TERRAINS[name], row["others"]) for name, row in rows("horizon")[f"rim of {rim} cells"].items() if "failed" not in row]
+        for name, row in [*found, (mountains(rim)["terrain"], mountains(rim))]:
+            lines.setdefault(name, [name]).extend([f"{percent(row['over 0.1'])} / {percent(row['over 1'])}", f"{row['most']:.1f}"])
+    heads = [[f"rim of {rim}, over 0.1 / 1 degree", "largest, degrees"] for rim in RIMS]
+    return ["", *heads[0], *heads[1]], list(lines.values())
+
+
+def mountains(rim):
+    """What a rim costs in mountains that are wider."""
+    with open(os.path.join(RECORDS, MOUNTAINS)) as file:
+        return next(row for row in json.load(file)["rows"] if row["rim"] == rim)
 
 
 TABLES = {

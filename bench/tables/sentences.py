@@ -302,6 +302,8 @@ def moving(of):
 def of_the_atlas():
     seen = atlas.rows("viewshed")["antumbra"]["old-town"]["seen"]
     yield ATLAS, f"In the old town the eyes see {100 * seen:.1f} % of the cells"
+    cells = atlas.mountains(500)["cells computed for a cell"]
+    yield "docs/src/python/many-machines.md", f"In the mountains, workers compute {cells:.1f} cells for each cell of the result"
 
 
 # The source of each figure that is not computed above: (text of the page, file or one of KINDS, what the file has).
