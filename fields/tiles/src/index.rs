@@ -1,9 +1,9 @@
 //! The index of a raster of many files, as text.
 
-use std::fs;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use antumbra_files::write_file;
+use antumbra_files::{open, write_file};
 use antumbra_terrain::{Monitor, Tile};
 use serde::{Deserialize, Serialize};
 
@@ -89,7 +89,9 @@ impl Index {
     /// # Errors
     /// There is no such file, or it is no index.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = fs::read_to_string(path).map_err(|error| Error::io(path, error))?;
+        let mut text = String::new();
+        let read = open(path).and_then(|mut file| file.read_to_string(&mut text));
+        read.map_err(|error| Error::io(path, error))?;
         let mut lines = text.lines().enumerate();
         let bad = |line: usize, reason: String| {
             Error::broken(path, format!("line {}: {reason}", line + 1))

@@ -334,7 +334,7 @@ impl Sweeps {
 
     fn open(path: &Path) -> Result<Self, Failure> {
         let read = || {
-            let mut file = File::open(path)?;
+            let mut file = antumbra_files::open(path)?;
             let mut head = [0; 24];
             file.read_exact(&mut head)?;
             let (magic, count) = head.split_at(16);

@@ -1,7 +1,5 @@
 //! `antumbra merge` of plans: results as one file.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use antumbra_image::atomic_write;
@@ -12,15 +10,12 @@ use super::{PLAN, Part, Plan, State};
 use crate::args::MergeArgs;
 use crate::bake::{self, tile};
 use crate::exit::{Failure, tell};
-use crate::interrupt;
 use crate::output::{Files, is_one_of};
+use crate::{archive, interrupt};
 
 /// Whether a file is a plan, by its first bytes.
 pub fn is_plan(path: &Path) -> bool {
-    let wanted = format!("{{\"schema\":\"{PLAN}\"");
-    let mut start = vec![0; wanted.len()];
-    let read = File::open(path).and_then(|mut file| file.read_exact(&mut start));
-    read.is_ok() && start == wanted.as_bytes()
+    archive::starts_with(path, format!("{{\"schema\":\"{PLAN}\"").as_bytes())
 }
 
 /// Joins the results of a plan. Returns the parts of a rendering or a bake, which their own command joins.

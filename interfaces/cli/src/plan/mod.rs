@@ -22,6 +22,7 @@ use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 use crate::exit::Failure;
+use crate::input;
 
 pub use check::check;
 pub use make::make;
@@ -144,8 +145,7 @@ impl Plan {
         let bad = |line: usize, reason: String| {
             Failure::Data(format!("{}:{}: {reason}", path.display(), line + 1))
         };
-        let text = fs::read_to_string(path);
-        let text = text.map_err(|error| Failure::Usage(format!("{}: {error}", path.display())))?;
+        let text = input::text(path)?;
         let (first, rest) = text.split_once('\n').unwrap_or((&text, ""));
         let head: Head = serde_json::from_str(first)
             .map_err(|error| bad(0, format!("wanted a plan of `antumbra plan`: {error}")))?;
