@@ -45,6 +45,7 @@ use std::path::{Path, PathBuf};
 
 pub use index::{Index, Listed};
 pub use indexed::Indexed;
+pub use store::checksum;
 
 /// Why a raster cannot be indexed or read.
 #[derive(Debug, thiserror::Error)]

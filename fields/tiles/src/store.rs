@@ -163,7 +163,18 @@ fn unit([columns, rows]: [usize; 2], size: [usize; 2]) -> [usize; 2] {
     }
 }
 
-/// Length of a file and the checksum of its bytes.
+/// Length of a file, and the checksum of its bytes: XXH3, 64 bits.
+///
+/// ```
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("empty");
+/// std::fs::write(&path, "")?;
+/// assert_eq!(antumbra_tiles::checksum(&path)?, (0, 0x2d06_8005_38d3_94c2));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+///
+/// # Errors
+/// The file cannot be read.
 pub fn checksum(path: &Path) -> Result<(u64, u64), Error> {
     let read = || {
         let mut file = antumbra_files::open(path)?;

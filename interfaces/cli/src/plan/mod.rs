@@ -15,11 +15,10 @@ mod survey;
 
 use std::collections::HashMap;
 use std::fs;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use xxhash_rust::xxh3::{Xxh3, xxh3_64};
+use xxhash_rust::xxh3::xxh3_64;
 
 use crate::exit::Failure;
 use crate::input;
@@ -263,15 +262,6 @@ fn sum_text(sum: u64) -> String {
 
 /// Length and checksum of a file.
 fn checksum(path: &Path) -> Result<(u64, String), Failure> {
-    let failed = |error| Failure::Work(format!("{}: {error}", path.display()));
-    let mut file = antumbra_files::open(path).map_err(failed)?;
-    let (mut sum, mut bytes, mut total) = (Xxh3::new(), vec![0; 1 << 16], 0);
-    loop {
-        let count = file.read(&mut bytes).map_err(failed)?;
-        if count == 0 {
-            return Ok((total, sum_text(sum.digest())));
-        }
-        sum.update(&bytes[..count]);
-        total += count as u64;
-    }
+    let (bytes, sum) = antumbra_tiles::checksum(path)?;
+    Ok((bytes, sum_text(sum)))
 }
