@@ -251,14 +251,14 @@ impl<T: Tiles> Pull<'_, T> {
     }
 
     /// Which cells of a tile, one of the raster or any other rectangle of it, get light from each direction: an azimuth in
-    /// degrees and the tangent of an elevation. There is a bit for each cell, as of [`Shadows::lit`].
+    /// degrees and the tangent of an elevation. There is a bit for each cell, as of [`Shadows::lit`](crate::Shadows::lit).
     ///
     /// The memory is a bit for each cell and direction, and up to 24 bytes for each cell of a window of at most 12 million cells
     /// around the tile. With many directions at once it is read fewer times. Where more would be needed, as for a sun near the
     /// horizon of a large raster, the memory is 8 bytes for each cell and a part of a tile, and the time is longer.
     ///
     /// # Errors
-    /// As of [`Pull::horizons`] and [`Shadows::lit`].
+    /// As of [`Pull::horizons`] and [`Shadows::lit`](crate::Shadows::lit).
     pub fn lit(
         &self,
         tile: &Tile,
