@@ -2,8 +2,8 @@
 
 use std::collections::HashSet;
 
-use crate::Error;
 use crate::angles::sin_cos_degrees;
+use crate::{Error, memory};
 
 /// Heights of the cells of a raster, row by row.
 ///
@@ -17,6 +17,8 @@ pub struct HeightField<'a> {
     height: usize,
     rows: &'a [f64],
     transform: [f64; 6],
+    /// Whether a cell and all eight around it have data; empty in a field without holes.
+    surrounded: Vec<bool>,
     wires: HashSet<Wire>,
     has_holes: bool,
 }
@@ -84,11 +86,14 @@ impl<'a> HeightField<'a> {
             height,
             rows: heights,
             transform,
+            surrounded: Vec::new(),
             wires: HashSet::new(),
             // A single row has no triangle, so that none of its edges counts.
             has_holes: width < 2 || height < 2 || !is_whole,
         };
         if field.has_holes {
+            field.surrounded = memory::filled("cells without holes around", cells, false)?;
+            field.find_surrounded();
             field.find_wires();
         }
         Ok(field)
@@ -105,8 +110,34 @@ impl<'a> HeightField<'a> {
             height,
             rows,
             transform,
+            surrounded: Vec::new(),
             wires: HashSet::new(),
             has_holes: false,
+        }
+    }
+
+    /// Finds cells that have data on all sides.
+    fn find_surrounded(&mut self) {
+        let width = self.width;
+        if width < 3 {
+            return;
+        }
+        // Rows of three in each row, then three rows.
+        let mut beside = [(); 3].map(|()| vec![false; width]);
+        for (row, heights) in self.rows.chunks_exact(width).enumerate() {
+            beside.rotate_left(1);
+            let triples = heights.windows(3);
+            let found = triples.map(|cells| cells.iter().fold(true, |all, x| all & !x.is_nan()));
+            beside[2][1..width - 1]
+                .iter_mut()
+                .zip(found)
+                .for_each(|(own, found)| *own = found);
+            if row >= 2 {
+                let cells = &mut self.surrounded[(row - 1) * width..][..width];
+                for (column, cell) in cells.iter_mut().enumerate() {
+                    *cell = beside[0][column] & beside[1][column] & beside[2][column];
+                }
+            }
         }
     }
 
@@ -117,10 +148,10 @@ impl<'a> HeightField<'a> {
             is_inside && self.rows[row * self.width + column].is_finite()
         };
         for (cell, height) in self.rows.iter().enumerate() {
-            let [column, row] = [cell % self.width, cell / self.width];
-            if !height.is_finite() {
+            if !height.is_finite() || self.surrounded[cell] {
                 continue;
             }
+            let [column, row] = [cell % self.width, cell / self.width];
             let any = |cells: [(usize, usize); 4]| cells.into_iter().any(|(c, r)| has(c, r));
             // Behind column or row 0 there is none, as behind the last ones.
             let [before, above] = [column.wrapping_sub(1), row.wrapping_sub(1)];
@@ -320,6 +351,10 @@ impl<'a> HeightField<'a> {
 
     /// Whether an edge of a triangle is between two cells with data, which are neighbours or at two corners of a square.
     pub(crate) fn has_edge(&self, [c, r]: [f64; 2], [c2, r2]: [f64; 2]) -> bool {
+        if self.is_surrounded([c, r]) {
+            // Whole squares have one diagonal.
+            return c == c2 || r == r2 || (c < c2) == (r < r2);
+        }
         let has = |column: f64, row: f64| self.height_at([column, row]).is_some();
         let beside = (has(c2, r), has(c, r2));
         match (c != c2, r != r2) {
@@ -334,8 +369,21 @@ impl<'a> HeightField<'a> {
         }
     }
 
+    /// Which cells of a field with holes have data, as all around them.
+    pub(crate) fn surrounded(&self) -> &[bool] {
+        &self.surrounded
+    }
+
+    fn is_surrounded(&self, [column, row]: [f64; 2]) -> bool {
+        let cell = row as usize * self.width + column as usize;
+        self.surrounded.get(cell).is_some_and(|found| *found)
+    }
+
     /// Whether a cell with data is the corner of a triangle.
     pub(crate) fn has_triangle(&self, [c, r]: [f64; 2]) -> bool {
+        if self.is_surrounded([c, r]) {
+            return true;
+        }
         let beside = [[c - 1.0, r], [c + 1.0, r], [c, r - 1.0], [c, r + 1.0]];
         let mut beside = beside.into_iter();
         beside.any(|other| self.height_at(other).is_some() && self.has_edge([c, r], other))

@@ -153,6 +153,19 @@ fn dome(size: [i64; 2]) -> Whole {
     Whole { heights, ..whole }
 }
 
+/// Rough ground with a lake at a corner, so that most tiles have no hole.
+fn lake(size: [i64; 2]) -> Whole {
+    let mut whole = Whole::new(size, PLAIN, 0.0, 1.5, 0.0);
+    for cell in 0..size[0] * size[1] {
+        let [x, y] = [cell % size[0], cell / size[0]];
+        if x * x + 2 * y * y < 300 {
+            whole.heights[cell as usize] = f64::NAN;
+        }
+    }
+    let has_holes = true;
+    Whole { has_holes, ..whole }
+}
+
 /// Tiles between cuts of both axes.
 fn grid(cuts: [Vec<i64>; 2]) -> Vec<Tile> {
     let [columns, rows] = cuts;
@@ -217,6 +230,7 @@ fn tiles_have_the_bits_of_the_whole() {
         Whole::new([52, 47], [0.0, 25.0, 0.0, 0.0, 0.0, -3.0], 0.7, 0.0, 2e-3),
         Whole::new([60, 40], PLAIN, 0.0, 900.0, 1e-2),
         dome([110, 100]),
+        lake([66, 58]),
         Whole::new([1, 33], PLAIN, 0.0, 1.0, 0.0),
     ];
     let mut rng = Rng::new(4);

@@ -14,10 +14,11 @@ struct Case {
     drop: f64,
 }
 
-const CASES: [Case; 9] = [
+const CASES: [Case; 10] = [
     case([70, 60], PLAIN, 0.0, 0.0, 0.0),
     case([33, 90], [9.0, 2.0, 0.5, 7.0, -0.25, -1.5], 0.0, 1.7, 0.0),
     case([64, 40], PLAIN, 0.2, 0.0, 0.0),
+    case([61, 55], PLAIN, 0.01, 0.0, 0.0),
     case([50, 51], PLAIN, 0.5, 2.0, 1e-3),
     case([41, 47], PLAIN, 0.0, 0.0, 2e-3),
     case([40, 40], PLAIN, 0.0, 30.0, 1e-2),

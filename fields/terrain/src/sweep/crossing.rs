@@ -12,6 +12,12 @@ pub struct Crossing {
 }
 
 impl Crossing {
+    /// Whether only a square with three corners can have the edge.
+    pub fn is_of_holes(&self) -> bool {
+        let [([c, r], _), ([c2, r2], _)] = self.ends;
+        c != c2 && r != r2 && (c < c2) != (r < r2)
+    }
+
     /// Crossings on the way of a step towards the observer, from far to near, and the number of parts of the step.
     ///
     /// On a line from the cell at the end of the way back along `[q, p]`, the lines of a family, where `a c + b r` of column `c` and

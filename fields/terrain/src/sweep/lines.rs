@@ -272,13 +272,16 @@ impl<Of: Fn(f64) -> f32> Walk<'_, Of> {
                 let [(a, share_a), (b, share_b)] = crossing.ends.map(|([columns, rows], share)| {
                     let offset = rows * field.size()[0] as isize + columns;
                     let first = (origin + offset + crossed.start as isize) as usize;
-                    (&heights[first..first + crossed.len()], share)
+                    (first..first + crossed.len(), share)
                 });
-                let ends = a.iter().zip(b);
-                for (new, (a, b)) in new.heights[crossed.clone()].iter_mut().zip(ends) {
-                    *new = share_a * a + share_b * b;
+                let has_hole = field.has_holes() && field.surrounded()[a.clone()].contains(&false);
+                if has_hole || !crossing.is_of_holes() {
+                    let ends = heights[a].iter().zip(&heights[b]);
+                    for (new, (a, b)) in new.heights[crossed.clone()].iter_mut().zip(ends) {
+                        *new = share_a * a + share_b * b;
+                    }
                 }
-                if has_holes {
+                if has_hole {
                     leave_out(&mut new.heights, &crossed, |line| {
                         !lines.has_edge([station, place + line as isize], crossing)
                     });
@@ -293,9 +296,10 @@ impl<Of: Fn(f64) -> f32> Walk<'_, Of> {
         }
         let rise = lines.parts * rise;
         let eyes = new.heights.map(|height| height + rise);
-        if has_holes {
+        if field.has_holes() {
             leave_out(&mut new.heights, inside, |line| {
-                !field.has_triangle(lines.cell([station, place + line as isize]))
+                !field.surrounded()[cell(line)]
+                    && !field.has_triangle(lines.cell([station, place + line as isize]))
             });
         }
         self.hulls.pass(inside.clone(), &new);
