@@ -19,8 +19,7 @@ def lazy(plan):
     with open(os.path.join(folder, head["scene"])) as index:
         whole = json.loads(next(index))
     bands, (x, dx, _, y, _, dy) = len(head["bands"]), whole["transform"]
-    side = max(max(task["tile"][2:]) for task in tasks if "tile" in task)
-    rows, columns = (da.core.normalize_chunks(side, (whole[of],))[0] for of in ("rows", "columns"))
+    rows, columns = head["chunks"]
     chunks = [[da.full((bands, high, wide), np.nan, "f4") for wide in columns] for high in rows]
     run, load, done = dask.delayed(run_task, pure=False), dask.delayed(read_tile), {}
     for task in tasks:
@@ -29,6 +28,7 @@ def lazy(plan):
         if output.endswith(".tif"):
             left, top, wide, high = task["tile"]
             tile = da.from_delayed(load(output, done[id]), (bands, high, wide), "f4")
-            chunks[top // side][left // side] = tile
+            row, column = (np.cumsum([0, *sizes]).tolist().index(at) for sizes, at in ((rows, top), (columns, left)))
+            chunks[row][column] = tile
     places = {"y": y + dy * (np.arange(whole["rows"]) + 0.5), "x": x + dx * (np.arange(whole["columns"]) + 0.5)}
     return xr.DataArray(da.block(chunks), places, ("band", "y", "x"))

@@ -186,11 +186,6 @@ impl Index {
             e,
         ]
     }
-
-    /// Whether a file may have data in a tile.
-    pub fn has_files(&self, tile: &Tile) -> bool {
-        self.files.iter().any(|file| tile.touches(&file.tile()))
-    }
 }
 
 impl Listed {

@@ -70,9 +70,9 @@ impl Indexed {
         })
     }
 
-    /// Numbers of the files of which something was read.
-    pub fn read_files(&self) -> Vec<usize> {
-        self.store.opened()
+    /// Numbers of the files of which something was used since the last call.
+    pub fn used_files(&self) -> Vec<usize> {
+        self.store.used()
     }
 }
 
@@ -109,10 +109,10 @@ impl Tiles for Indexed {
             f64::NAN,
         )?;
         for (number, file) in self.index.files.iter().enumerate() {
-            let own = part.within(&file.tile());
-            if own.size.contains(&0) {
+            if !part.touches(&file.tile()) {
                 continue;
             }
+            let own = part.within(&file.tile());
             let place = [0, 1].map(|axis| (own.at[axis] - part.at[axis]) as usize);
             let at = [0, 1].map(|axis| own.at[axis] - file.at[axis] as i64);
             let inner = Tile { at, size: own.size };

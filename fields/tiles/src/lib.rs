@@ -26,7 +26,7 @@
 //! let west = Tile { at: [0, 0], size: [4, 4] };
 //! let east = Pull { tiles: &plain, rise: 0.0 }.horizons(&west, &[90.0], 0.0, &())?;
 //! assert_eq!(degrees(east.values[0][3]), degrees(2.0 / 4.0));
-//! assert_eq!(plain.read_files(), [0, 1]);
+//! assert_eq!(plain.used_files(), [0, 1]);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::io::Read;
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use antumbra_raster::Parts;
@@ -18,6 +19,7 @@ const LEAST: usize = 1 << 16;
 #[derive(Debug)]
 pub struct Store {
     files: Vec<OnceLock<Parts>>,
+    used: Vec<AtomicBool>,
     kept: Mutex<Kept>,
     most_bytes: usize,
 }
@@ -38,20 +40,22 @@ impl Store {
     pub fn new(files: usize, most_bytes: u64) -> Self {
         Self {
             files: (0..files).map(|_| OnceLock::new()).collect(),
+            used: (0..files).map(|_| AtomicBool::new(false)).collect(),
             kept: Mutex::default(),
             most_bytes: usize::try_from(most_bytes).unwrap_or(usize::MAX),
         }
     }
 
-    /// Numbers of the files that were opened.
-    pub fn opened(&self) -> Vec<usize> {
-        let all = self.files.iter().enumerate();
-        all.filter_map(|(number, file)| file.get().map(|_| number))
-            .collect()
+    /// Numbers of the files that were used since the last call.
+    pub fn used(&self) -> Vec<usize> {
+        let all = self.used.iter().enumerate();
+        let used = all.filter(|(_, used)| used.swap(false, Ordering::Relaxed));
+        used.map(|(number, _)| number).collect()
     }
 
     /// The file of this number. Its checksum is looked at when it is opened.
     pub fn open(&self, number: usize, listed: &Listed) -> Result<&Parts, Error> {
+        self.used[number].store(true, Ordering::Relaxed);
         if let Some(file) = self.files[number].get() {
             return Ok(file);
         }

@@ -11,7 +11,7 @@ use antumbra_image::{Allowance, Raster, Samples};
 use antumbra_lab::count;
 use antumbra_load::{
     Diagnostic, Extent, Heights, Loaded, MemorySize, Options, Severity, Sky, Stage, Tiles, Up,
-    Upright, check_picture,
+    Upright, Warning, check_picture,
 };
 use antumbra_raster::{Crs, Grid, unit_name};
 use antumbra_render::{Camera, World};
@@ -131,6 +131,17 @@ fn tell_tiles(name: &Path, found: Option<(Tiles, &Grid)>) {
     tell(format_args!("{text}"));
 }
 
+/// Prints warnings about a file, which are errors if tolerance says so.
+pub fn tell_warnings(warnings: &[Warning]) -> Result<(), Failure> {
+    if STRICT.load(Ordering::Relaxed) && !warnings.is_empty() {
+        return Err(antumbra_load::Error::Strict(warnings.to_vec()).into());
+    }
+    for warning in warnings {
+        tell(format_args!("{warning}"));
+    }
+    Ok(())
+}
+
 /// Reads height rasters as one without making a mesh of it, and prints the reader's warnings.
 pub fn load_heights(names: &[PathBuf], max_memory: MemorySize) -> Result<Heights, Failure> {
     let reading = progress::doing(&names[0].to_string_lossy(), "reading");
@@ -138,9 +149,7 @@ pub fn load_heights(names: &[PathBuf], max_memory: MemorySize) -> Result<Heights
     drop(reading);
     interrupt::check()?;
     let heights = heights?;
-    for warning in &heights.warnings {
-        tell(format_args!("{warning}"));
-    }
+    tell_warnings(&heights.warnings)?;
     tell_tiles(&names[0], heights.tiles.zip(Some(&heights.raster.grid)));
     Ok(heights)
 }

@@ -135,6 +135,15 @@ pub fn read(path: &Path, max_bytes: u64, purpose: Purpose) -> Result<Raster, Err
     read_all(&[path.to_path_buf()], max_bytes, purpose).map(|mosaic| mosaic.raster)
 }
 
+/// Reads the numbers of one file as they are stored: no unit of heights, scale or mark of missing data changes them. So a result comes
+/// back as it was written, for example hours of sun in a coordinate system whose heights are in feet.
+///
+/// # Errors
+/// As [`read`], but for coordinates of any kind.
+pub fn read_numbers(path: &Path, max_bytes: u64) -> Result<Raster, Error> {
+    stored(path, max_bytes, Purpose::Values, true).map(Raster::north_up)
+}
+
 /// Reads one file as it is stored: rows and columns in its own order, and numbers without a meaning if it is to be `is_raw`.
 fn stored(path: &Path, max_bytes: u64, purpose: Purpose, is_raw: bool) -> Result<Raster, Error> {
     let parts = Parts::with_header(path, (max_bytes, purpose), is_raw)?;

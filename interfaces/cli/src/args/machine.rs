@@ -26,11 +26,26 @@ pub struct MachineArgs {
         long_help = help_one("Instruction set", &names::levels(), "auto is the best of this CPU. Never changes the picture.")
     )]
     pub level: LevelChoice,
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
+/// The flag about threads.
+#[derive(Debug, Args)]
+#[command(next_help_heading = heading::MACHINE)]
+pub struct ThreadArgs {
     /// Number of threads [default: all CPUs]
     ///
     /// Never changes the picture.
     #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<u16>::new().range(1..=1024))]
     pub threads: Option<u16>,
+}
+
+impl ThreadArgs {
+    /// Starts the chosen number of threads. Everything parallel uses them from then on.
+    pub fn start(&self) -> Result<(), Failure> {
+        start_threads(self.threads.and_then(|n| NonZeroUsize::new(n.into())))
+    }
 }
 
 impl MachineArgs {
@@ -41,7 +56,7 @@ impl MachineArgs {
 
     /// Starts the chosen number of threads. Everything parallel uses them from then on.
     pub fn start_threads(&self) -> Result<(), Failure> {
-        start_threads(self.threads.and_then(|n| NonZeroUsize::new(n.into())))
+        self.threads.start()
     }
 }
 

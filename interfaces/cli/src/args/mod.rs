@@ -47,7 +47,7 @@ pub use farm::{FarmArgs, FarmCommand, OpenjdArgs, SlurmArgs};
 pub use image::{CompareArgs, ImageCommand};
 pub use info::InfoArgs;
 pub use list::{ListArgs, ListName};
-pub use machine::{MachineArgs, start_threads};
+pub use machine::{MachineArgs, ThreadArgs, start_threads};
 pub use man::{CompletionsArgs, ManArgs};
 pub use map::MapArgs;
 pub use merge::MergeArgs;
@@ -174,8 +174,8 @@ pub enum Command {
     Farm(FarmCommand),
     /// Make height rasters of many files one, by an index
     ///
-    /// Then horizon and sun take the index as a scene, and `plan` divides their work into tiles, which need no more memory than a
-    /// tile and have the bits of the whole. All cells are read once. Example:
+    /// Then horizon, sun and visible take the index as a scene, and `plan` divides their work into tiles, whose memory does not grow
+    /// with the raster, and whose results have the bits of the whole. All cells are read once. Example:
     ///
     /// antumbra index tiles/*.tif -o country.index
     Index(IndexArgs),

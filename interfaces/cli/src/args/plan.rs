@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{MachineArgs, SCENE, SCENE_LONG, heading};
+use super::{SCENE, SCENE_LONG, ThreadArgs, heading};
 use crate::json::Destination;
 
 /// Flags of `index`.
@@ -21,13 +21,13 @@ pub struct IndexArgs {
     #[arg(short, long, value_name = "FILE", required = true, help_heading = heading::OUTPUT)]
     pub output: PathBuf,
     #[command(flatten)]
-    pub machine: MachineArgs,
+    pub threads: ThreadArgs,
 }
 
 /// Flags of `plan`.
 #[derive(Debug, Args)]
 pub struct PlanArgs {
-    #[arg(help = SCENE, long_help = format!("{SCENE_LONG}; or an index of height rasters"))]
+    #[arg(help = SCENE, long_help = format!("An index of height rasters, or any scene that other machines read under its name. {SCENE_LONG}"))]
     pub scene: PathBuf,
     /// Plan to write, such as plan.jsonl
     ///
@@ -69,7 +69,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "ID", num_args = 1.., help_heading = heading::JOB)]
     pub task: Vec<String>,
     #[command(flatten)]
-    pub machine: MachineArgs,
+    pub threads: ThreadArgs,
 }
 
 /// Flags of `check`.

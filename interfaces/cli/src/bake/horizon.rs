@@ -240,7 +240,7 @@ impl Baking for HorizonArgs {
         let index = raster.index();
         // Where no azimuth follows from the place, a plan can do without the files.
         if matches!(self.azimuths(), Azimuths::Even(_)) {
-            tile::settle(raster, &Asked::new(&self.raster, &self.places))?;
+            tile::settle(raster, &self.scene, &Asked::new(&self.raster, &self.places))?;
         }
         let field = HeightField::new([2, 2], &[0.0; 4], index.transform);
         let (azimuths, directions) = self.directions(&field.map_err(Error::from)?)?;
@@ -253,6 +253,7 @@ impl Baking for HorizonArgs {
         Ok(Tiling {
             directions,
             bands: bands.collect(),
+            eyes: Vec::new(),
         })
     }
 

@@ -23,8 +23,9 @@ use crate::exit::Failure;
 use crate::input::check_answers;
 use crate::output::is_one_of;
 
-/// Part of the memory that heights of other tiles may take.
+/// Part of the memory that heights of other tiles may take, and most bytes of them, since many tasks may share a machine.
 const KEPT: u64 = 4;
+pub const MOST_KEPT: u64 = 256 << 20;
 
 /// Azimuths that are pulled together, at most, and bytes of their slopes: 8 for each cell.
 const TOGETHER: usize = 16;
@@ -37,15 +38,17 @@ pub fn is_index(path: &Path) -> bool {
 
 /// Opens the raster of an index.
 pub fn open(index: &Path, memory: MemorySize) -> Result<Indexed, Failure> {
-    Ok(Indexed::open(index, memory.bytes() / KEPT)?)
+    let kept = (memory.bytes() / KEPT).min(MOST_KEPT);
+    Ok(Indexed::open(index, kept)?)
 }
 
-/// Settles north and units as of the whole raster.
-pub fn settle(raster: &Indexed, asked: &Asked<'_>) -> Result<(), Failure> {
+/// Settles north and units as of the whole raster of this name.
+pub fn settle(raster: &Indexed, scene: &[PathBuf], asked: &Asked<'_>) -> Result<(), Failure> {
     let index = raster.index();
     let grid = raster.grid(&index.whole())?;
     let middle = DVec3::from(index.low).midpoint(index.high.into());
-    asked.settle("index", grid.crs.as_ref(), middle.to_array())?;
+    let name = antumbra_load::raster_name(scene);
+    asked.settle(&name, grid.crs.as_ref(), middle.to_array())?;
     Ok(())
 }
 
@@ -55,6 +58,8 @@ pub struct Tiling {
     pub directions: Vec<Direction>,
     /// Name and unit of each band of the results.
     pub bands: Vec<[String; 2]>,
+    /// Cells around observers: all between these and a tile are read.
+    pub eyes: Vec<Tile>,
 }
 
 /// Quarters that have steps, and these.
@@ -81,6 +86,8 @@ pub struct TileWork<'a> {
     pub quarter: Option<(usize, &'a Path)>,
     /// Files of the sweeps of this tile, quarter by quarter, or for a sweep the files of the tiles ahead.
     pub sweeps: &'a [PathBuf],
+    /// Whether sweeps begin in this tile, as if it were the whole, to see how long they take.
+    pub is_sample: bool,
     /// Why other tiles cannot be read.
     failure: Mutex<Option<tiles::Error>>,
 }
@@ -96,6 +103,7 @@ impl<'a> TileWork<'a> {
             tile,
             quarter,
             sweeps,
+            is_sample: false,
             failure: Mutex::default(),
         }
     }
@@ -200,7 +208,11 @@ impl<'a> TileWork<'a> {
         let most = |axis: usize| steps.iter().map(|step| i64::from(step[axis].abs())).max();
         let margin = [0, 1].map(|axis| most(axis).unwrap_or(0).max(1));
         let index = self.raster.index();
-        let window = self.tile.with_margin(margin, &index.whole());
+        let whole = match self.is_sample {
+            true => self.tile,
+            false => index.whole(),
+        };
+        let window = self.tile.with_margin(margin, &whole);
         let heights = self.raster.read(window)?;
         let field = HeightField::new(window.size, &heights, index.transform_at(window.at));
         let field = field.map_err(Error::from)?;
@@ -216,9 +228,12 @@ impl<'a> TileWork<'a> {
                     rise,
                     drop: 0.0,
                 },
-                at: window.at,
-                tile: self.tile,
-                whole: index.whole().size.map(|cells| cells as i64),
+                at: [0, 1].map(|axis| window.at[axis] - whole.at[axis]),
+                tile: Tile {
+                    at: [0, 1].map(|axis| self.tile.at[axis] - whole.at[axis]),
+                    ..self.tile
+                },
+                whole: whole.size.map(|cells| cells as i64),
                 has_holes: index.has_holes(),
             };
             let share = Share(monitor, [number, steps.len()]);
@@ -280,7 +295,7 @@ impl<'a> TileWork<'a> {
 }
 
 /// The cells around a place.
-fn around(place: [f64; 2]) -> Tile {
+pub fn around(place: [f64; 2]) -> Tile {
     Tile {
         at: place.map(|at| at.floor() as i64 - 1),
         size: [4; 2],

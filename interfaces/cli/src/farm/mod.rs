@@ -269,7 +269,8 @@ pub fn check_flags(flags: &[String]) -> Result<(), Failure> {
     }
 }
 
-fn is_built_in(scene: &Path) -> bool {
+/// Whether a scene is made by the program.
+pub fn is_built_in(scene: &Path) -> bool {
     scene
         .to_str()
         .is_some_and(|name| name.starts_with("builtin:"))

@@ -1,23 +1,25 @@
 //! What a plan takes: measured on a part of its own raster, before anything is run.
 
-use antumbra_bake::{Direction, Error, FieldHorizonJob, HeightField};
+use std::path::{Path, PathBuf};
+
 use antumbra_lab::thread_seconds;
 use antumbra_load::MemorySize;
-use antumbra_terrain::{Tile, Tiles};
+use antumbra_terrain::Tile;
 use antumbra_tiles::Indexed;
 
+use super::checksum;
+use super::make::parse;
 use super::run::PART;
-use crate::bake::tile::TileWork;
-use crate::bake::{BakeCommand, run_tile};
+use crate::args::Command;
+use crate::bake::run_tile;
+use crate::bake::tile::{self, MOST_KEPT, TileWork, Tiling};
 use crate::exit::{Failure, Loudness, quietly};
+use crate::output::text;
 
 /// Cells on a side of the squares that are measured, and seconds that the larger ones may take.
-const SMALL: usize = 96;
+const SMALL: usize = 160;
 const SAMPLE: usize = 512;
-const LONG: f64 = 3.0;
-
-/// Seconds to write and to read a number, about.
-const WRITTEN: f64 = 2e-8;
+const LONG: f64 = 6.0;
 
 /// Bytes of a program that has read nothing.
 const PROGRAM: u64 = 40 << 20;
@@ -25,82 +27,117 @@ const PROGRAM: u64 = 40 << 20;
 /// Bytes of heights and of what is made of them, for each cell of a tile.
 const CELL: u64 = 96;
 
-/// Seconds of one core for each cell; `None` where files of the raster are not here.
+/// Most bytes of what tiles around hide, as `antumbra_terrain::Pull` says.
+const AROUND: u64 = 24 * (12 << 20);
+
+/// Bytes of a cell between an observer and a tile.
+const BETWEEN: u64 = 24;
+
+/// What a part of the work takes.
 pub struct Rates {
-    sweep: Option<f64>,
-    /// For each cell of a tile, and for each one along its border.
-    tile: Option<[f64; 2]>,
+    /// Seconds of one core for a task; `None` where files of the raster are not here.
+    seconds: Option<Seconds>,
+    /// Cells of the raster.
+    whole: Tile,
     planes: usize,
+    eyes: Vec<Tile>,
+}
+
+/// Seconds of one core for each cell, and for each one along the border.
+#[derive(Clone, Copy, Default)]
+struct Seconds {
+    /// Of a sweep, for each of its steps.
+    sweep: [f64; 2],
+    /// Of a tile; with observers, for each cell up to one of them.
+    tile: [f64; 2],
 }
 
 impl Rates {
-    /// Measures a command on the middle of a raster.
+    /// Measures the command of a line on some parts of a raster.
     pub fn measure(
-        bake: &BakeCommand,
+        line: &[String],
         raster: &Indexed,
-        directions: &[Direction],
+        tiling: &Tiling,
         memory: MemorySize,
     ) -> Result<Self, Failure> {
         let mut rates = Self {
-            sweep: None,
-            tile: None,
-            planes: directions.len(),
+            seconds: None,
+            whole: raster.index().whole(),
+            planes: tiling.directions.len(),
+            eyes: tiling.eyes.clone(),
         };
         if raster.index().files.iter().any(|file| !file.path.is_file()) {
             return Ok(rates);
         }
+        let folder = tempfile::tempdir().map_err(Failure::work)?;
+        let sample = Sample {
+            line,
+            raster,
+            memory,
+            quarters: &tile::quarters(&tiling.directions),
+            folder: folder.path(),
+        };
         let one = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-        one.map_err(Failure::work)?
-            .install(|| {
-                let is_step = |direction: &Direction| matches!(direction, Direction::Step(_));
-                let swept = directions
-                    .iter()
-                    .filter(|direction| is_step(direction))
-                    .count();
-                if swept == 0 {
-                    rates.tile = Some(of_tile(bake, raster, memory)?);
-                    return Ok(());
-                }
-                let (sweep, azimuth) = of_directions(raster, directions)?;
-                rates.sweep = Some(sweep + WRITTEN);
-                let pulled = (directions.len() - swept) as f64 * azimuth;
-                rates.tile = Some([pulled + directions.len() as f64 * WRITTEN, 0.0]);
-                Ok(())
-            })
-            .map(|()| rates)
+        let seconds = one
+            .map_err(Failure::work)?
+            .install(|| match rates.eyes.is_empty() {
+                true => sample.squares(),
+                false => sample.viewsheds(|tile| rates.between(tile)),
+            });
+        rates.seconds = Some(seconds?);
+        Ok(rates)
     }
 
     /// Seconds of a sweep.
     pub fn sweep(&self, tile: &Tile, steps: usize) -> Option<f64> {
-        self.sweep
-            .map(|rate| rate * (tile.size[0] * tile.size[1] * steps) as f64)
+        let [columns, rows] = tile.size.map(|cells| cells as f64);
+        let [cell, along] = self.seconds?.sweep;
+        Some((cell * columns * rows + along * 2.0 * (columns + rows)) * steps as f64)
     }
 
-    /// Seconds of a tile, which is computed part by part.
+    /// Cells between observers and a tile, all together.
+    fn between(&self, tile: &Tile) -> f64 {
+        let hulls = self.eyes.iter().map(|eye| tile.hull(eye).size);
+        hulls.map(|[columns, rows]| (columns * rows) as f64).sum()
+    }
+
+    /// Seconds of a tile, which is computed part by part if there are no observers.
     pub fn tile(&self, tile: &Tile) -> Option<f64> {
+        let [cell, along] = self.seconds?.tile;
+        if !self.eyes.is_empty() {
+            return Some(cell * self.between(tile));
+        }
         let [columns, rows] = tile.size.map(|cells| cells as f64);
         let [across, down] = tile.size.map(|cells| cells.div_ceil(PART) as f64);
         let border = 2.0 * (columns * down + rows * across);
-        self.tile
-            .map(|[cell, along]| cell * columns * rows + along * border)
+        Some(cell * columns * rows + along * border)
     }
 
-    /// Most bytes of memory of a tile.
+    /// Most bytes of memory of a tile, about.
     pub fn memory_of_tile(&self, tile: &Tile) -> u64 {
-        let [columns, rows] = tile.size.map(|cells| cells as u64);
-        // Larger tiles are computed part by part.
-        let part = (PART as u64).min(columns) * (PART as u64).min(rows);
-        let cells = if self.planes == 0 {
-            part
-        } else {
-            columns * rows
+        let cells = |tile: &Tile| tile.size[0] as u64 * tile.size[1] as u64;
+        let whole = cells(&self.whole);
+        // Larger tiles are computed part by part, but for planes and viewsheds.
+        let part = match self.planes + self.eyes.len() {
+            0 => tile
+                .size
+                .map(|cells| cells.min(PART) as u64)
+                .iter()
+                .product(),
+            _ => cells(tile),
         };
-        PROGRAM + CELL * cells + 8 * columns * rows
+        let between = self.eyes.iter().map(|eye| BETWEEN * cells(&tile.hull(eye)));
+        let around = match between.max() {
+            Some(between) => between,
+            None => AROUND.min(24 * whole),
+        };
+        let kept = MOST_KEPT.min(8 * whole);
+        PROGRAM + kept + around + CELL * part + 8 * cells(tile)
     }
 }
 
 /// Places that are measured.
-const PLACES: usize = 3;
+const PLACES: usize = 6;
 
 /// A square in one of some files that are far from each other, each time elsewhere in the file.
 fn sample(raster: &Indexed, side: usize, place: usize) -> Tile {
@@ -115,60 +152,103 @@ fn sample(raster: &Indexed, side: usize, place: usize) -> Tile {
     }
 }
 
-/// Seconds for each cell, and for each one along the border, by squares of two sizes.
-fn of_tile(bake: &BakeCommand, raster: &Indexed, memory: MemorySize) -> Result<[f64; 2], Failure> {
-    // Seconds, cells and cells along borders of all places.
-    let measure = |side: usize| {
-        let mut sum = [0.0; 3];
-        for place in 0..PLACES {
-            let tile = sample(raster, side, place);
-            let work = TileWork::new(raster, tile, (None, &[]));
-            let start = thread_seconds();
-            quietly(Loudness::Quiet, || run_tile(bake.args().0, memory, &work))?;
-            let [columns, rows] = tile.size.map(|cells| cells as f64);
-            let found = [
-                thread_seconds() - start,
-                columns * rows,
-                2.0 * (columns + rows),
-            ];
-            sum = [0, 1, 2].map(|at| sum[at] + found[at]);
-        }
-        Ok::<[f64; 3], Failure>(sum)
-    };
-    // What is only read once is read before.
-    measure(SMALL)?;
-    let [first, cells, border] = measure(SMALL)?;
-    let side = SMALL as f64 * (LONG / first.max(1e-6)).sqrt();
-    let [second, more, longer] = measure(side.clamp(2.0 * SMALL as f64, SAMPLE as f64) as usize)?;
-    let area = cells * longer - more * border;
-    // Of files that are no larger than the small square there is one measure only.
-    if area.abs() < 1.0 {
-        return Ok([second / more, 0.0]);
-    }
-    let cell = (first * longer - second * border) / area;
-    let cell = cell.clamp(0.0, second / more);
-    Ok([cell, ((second - cell * more) / longer).max(0.0)])
+/// A command that is measured on squares of its raster.
+struct Sample<'a> {
+    line: &'a [String],
+    raster: &'a Indexed,
+    memory: MemorySize,
+    quarters: &'a [(usize, Vec<[i32; 2]>)],
+    /// A folder for its files.
+    folder: &'a Path,
 }
 
-/// Seconds for each cell of a sweep, and of an azimuth that is pulled.
-fn of_directions(raster: &Indexed, directions: &[Direction]) -> Result<(f64, f64), Failure> {
-    let tile = sample(raster, SAMPLE, PLACES / 2);
-    let heights = raster.read(tile)?;
-    let transform = raster.index().transform_at(tile.at);
-    let field = HeightField::new(tile.size, &heights, transform).map_err(Error::from)?;
-    let job = FieldHorizonJob::new(&field, directions, 0.0, 0.0)?;
-    let measure = |is_step: bool| {
-        let find = |direction: &Direction| matches!(direction, Direction::Step(_)) == is_step;
-        let Some(index) = directions.iter().position(find) else {
-            return Ok(0.0);
+impl Sample<'_> {
+    /// Seconds of the sweeps of a square, and of what follows.
+    fn seconds(&self, tile: Tile) -> Result<[f64; 2], Failure> {
+        let output = text(&self.folder.join("tile.tif"));
+        let Command::Bake(bake) = parse(self.line.to_vec(), &["-o", &output])? else {
+            return Ok([0.0; 2]);
         };
-        let start = thread_seconds();
-        job.plane(index, &())?;
-        Ok::<f64, Error>((thread_seconds() - start) / heights.len() as f64)
-    };
-    // The first one finds caches cold.
-    measure(true)?;
-    Ok((measure(true)?, measure(false)?))
+        // With the checksums of its result, and of the sweeps that it needs.
+        let time = |work: &TileWork<'_>, files: &[&Path]| {
+            let start = thread_seconds();
+            quietly(Loudness::Quiet, || {
+                run_tile(bake.args().0, self.memory, work)
+            })?;
+            for file in files {
+                checksum(file)?;
+            }
+            Ok::<f64, Failure>(thread_seconds() - start)
+        };
+        let sweeps = (0..4).map(|quarter| self.folder.join(format!("{quarter}.sweep")));
+        let sweeps: Vec<PathBuf> = sweeps.collect();
+        let mut swept = 0.0;
+        for (quarter, _) in self.quarters {
+            let part = Some((*quarter, &*sweeps[*quarter]));
+            let mut work = TileWork::new(self.raster, tile, (part, &[]));
+            work.is_sample = true;
+            swept += time(&work, &[&*sweeps[*quarter]; 4])?;
+        }
+        let work = TileWork::new(self.raster, tile, (None, &sweeps));
+        let files = self.quarters.iter().map(|(quarter, _)| &*sweeps[*quarter]);
+        let files: Vec<&Path> = files.chain([Path::new(&output)]).collect();
+        Ok([swept, time(&work, &files)?])
+    }
+
+    /// Seconds for each cell, and for each one along the border, by squares of two sizes.
+    fn squares(&self) -> Result<Seconds, Failure> {
+        // Seconds, cells and cells along borders of all places.
+        let measure = |side: usize| {
+            let (mut seconds, mut cells) = ([0.0; 2], [0.0; 2]);
+            for place in 0..PLACES {
+                let tile = sample(self.raster, side, place);
+                let found = self.seconds(tile)?;
+                let [columns, rows] = tile.size.map(|cells| cells as f64);
+                seconds = [0, 1].map(|kind| seconds[kind] + found[kind]);
+                cells = [cells[0] + columns * rows, cells[1] + 2.0 * (columns + rows)];
+            }
+            Ok::<_, Failure>((seconds, cells))
+        };
+        // What is only read once is read before.
+        measure(SMALL / 2)?;
+        let small = measure(SMALL)?;
+        let seconds: f64 = small.0.iter().sum();
+        let side = SMALL as f64 * (LONG / seconds.max(1e-6)).sqrt();
+        let large = measure(side.clamp(2.0 * SMALL as f64, SAMPLE as f64) as usize)?;
+        let rates = |kind: usize| {
+            let ([first, second], [[cells, border], [more, longer]]) =
+                ([small.0[kind], large.0[kind]], [small.1, large.1]);
+            let area = cells * longer - more * border;
+            // Of files that are no larger than the small square there is one measure only.
+            if area.abs() < 1.0 {
+                return [second / more, 0.0];
+            }
+            let cell = (first * longer - second * border) / area;
+            let cell = cell.clamp(0.0, second / more);
+            [cell, ((second - cell * more) / longer).max(0.0)]
+        };
+        let steps: usize = self.quarters.iter().map(|(_, steps)| steps.len()).sum();
+        Ok(Seconds {
+            sweep: rates(0).map(|seconds| seconds / steps.max(1) as f64),
+            tile: rates(1),
+        })
+    }
+
+    /// Seconds for each cell between observers and a tile.
+    fn viewsheds(&self, between: impl Fn(&Tile) -> f64) -> Result<Seconds, Failure> {
+        let (mut seconds, mut cells) = (0.0, 0.0);
+        for place in 0..PLACES {
+            // What is only read once is read before.
+            self.seconds(sample(self.raster, SMALL, place))?;
+            let tile = sample(self.raster, SAMPLE, place);
+            seconds += self.seconds(tile)?[1];
+            cells += between(&tile);
+        }
+        Ok(Seconds {
+            tile: [seconds / cells, 0.0],
+            ..Seconds::default()
+        })
+    }
 }
 
 /// Most bytes of memory of a sweep.

@@ -6,24 +6,29 @@ use std::path::{Path, PathBuf};
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
+use antumbra_raster::is_raster;
 use antumbra_terrain::Tile;
 use antumbra_tiles::Index;
 use clap::Parser;
 
 use super::bill::{self, Rates};
-use super::{Bill, Head, Input, PLAN, Part, Task, checksum, sum_text};
+use super::{Bill, Head, Input, PLAN, Part, Task, checksum, from, sum_text};
 use crate::args::{Cli, Command, PlanArgs};
 use crate::bake::BakeCommand;
-use crate::bake::tile::{self, Tiling, is_index};
+use crate::bake::tile::{self, is_index};
 use crate::exit::{Failure, tell};
-use crate::farm::check_flags;
+use crate::farm::{check_flags, is_built_in};
 use crate::output::{Files, beside, text};
-use crate::{interrupt, json};
+use crate::{interrupt, json, scenes};
 
 /// Runs the command.
 pub fn make(args: &PlanArgs, memory: MemorySize) -> Result<(), Failure> {
     let mut files = Files::default();
-    let is_built_in = args.scene.to_string_lossy().starts_with("builtin:");
+    if args.scene == Path::new(scenes::STDIN) {
+        let reason = "a plan names its scene: tasks need a file, not the standard input";
+        return Err(Failure::usage(reason));
+    }
+    let is_built_in = is_built_in(&args.scene);
     if !is_built_in {
         files.reads("the scene", &args.scene)?;
     }
@@ -45,6 +50,7 @@ pub fn make(args: &PlanArgs, memory: MemorySize) -> Result<(), Failure> {
         command: args.command.clone(),
         folder: from(&args.output, &folder)?,
         bands: Vec::new(),
+        chunks: [Vec::new(), Vec::new()],
         levels: Vec::new(),
         bill: Bill::default(),
     };
@@ -56,7 +62,7 @@ pub fn make(args: &PlanArgs, memory: MemorySize) -> Result<(), Failure> {
     }
     let tasks = match is_index(&args.scene) {
         true => of_tiles(args, memory, &mut head)?,
-        false => of_shards(args, &mut head)?,
+        false => of_shards(args, memory, &mut head)?,
     };
     let sum = |of: fn(&Task) -> Option<f64>| tasks.iter().map(of).sum::<Option<f64>>();
     head.bill.tasks = tasks.len();
@@ -95,7 +101,7 @@ pub fn make(args: &PlanArgs, memory: MemorySize) -> Result<(), Failure> {
     if *cells > 0 {
         let giga = |bytes: u64| bytes as f64 / 1e9;
         words += &format!(
-            ", {} cells; it reads {:.2} GB and writes {:.2} GB",
+            ", {} cells; it reads {:.2} GB at least and writes {:.2} GB",
             count(*cells),
             giga(*bytes_read),
             giga(*bytes_written)
@@ -106,23 +112,13 @@ pub fn make(args: &PlanArgs, memory: MemorySize) -> Result<(), Failure> {
     }
     if let (Some(hours), Some(memory)) = (core_hours, memory) {
         words += &format!(
-            "; about {} of one core, and at most {:.2} GB of memory for a task",
+            "; about {} of one core, and {:.2} GB of memory for a task at most",
             bill::time(3600.0 * hours),
             *memory as f64 / 1e9
         );
     }
     tell(format_args!("{words}"));
     Ok(())
-}
-
-/// A file as a plan names it: relative to the folder of the plan if it is in it.
-fn from(plan: &Path, path: &Path) -> Result<PathBuf, Failure> {
-    let absolute = |path| std::path::absolute(path).map_err(Failure::work);
-    let (plan, path) = (absolute(plan)?, absolute(path)?);
-    let folder = plan.parent().unwrap_or(Path::new(""));
-    Ok(path
-        .strip_prefix(folder)
-        .map_or_else(|_| path.clone(), Path::to_path_buf))
 }
 
 /// The command of a plan, with an output and more.
@@ -158,10 +154,10 @@ fn settle_files(bake: &BakeCommand, command: &mut [String]) -> Result<Vec<Input>
             "{flag}: every task of a plan writes one file only"
         )));
     }
-    let (_, outputs, json, _) = bake.args().0.shared();
-    if outputs.len() != 1 || json.is_some() {
-        let reason =
-            "--output, --json: every task of a plan writes one file only, which it names by itself";
+    let (_, outputs, json, chunks) = bake.args().0.shared();
+    let is_shared = chunks.shard.is_some_and(|shard| shard.count() > 1);
+    if outputs.len() != 1 || json.is_some() || is_shared {
+        let reason = "--output, --json, --shard: every task of a plan writes one file, which it names by itself";
         return Err(Failure::usage(reason));
     }
     let mut inputs = Vec::new();
@@ -173,17 +169,30 @@ fn settle_files(bake: &BakeCommand, command: &mut [String]) -> Result<Vec<Input>
         {
             *word = text(&absolute);
         }
-        let (_, xxh3) = checksum(path)?;
-        inputs.push(Input {
-            path: absolute,
-            xxh3,
-        });
+        inputs.extend(inputs_of(&absolute, None)?);
     }
     Ok(inputs)
 }
 
+/// Files that are read under a name: of a folder, its rasters; of a scene, all that it is read from.
+fn inputs_of(path: &Path, scene: Option<MemorySize>) -> Result<Vec<Input>, Failure> {
+    let files = match scene {
+        Some(memory) if !is_raster(path) => scenes::load_with_looks(path, memory)?.inputs,
+        _ if path.is_dir() => {
+            let files = antumbra_raster::files(&[path.to_path_buf()]);
+            files.map_err(|error| Failure::Scene(error.to_string()))?
+        }
+        _ => vec![path.to_path_buf()],
+    };
+    let input = |path: PathBuf| {
+        let (_, xxh3) = checksum(&path)?;
+        Ok(Input { path, xxh3 })
+    };
+    files.into_iter().map(input).collect()
+}
+
 /// Shares of a rendering or of a bake.
-fn of_shards(args: &PlanArgs, head: &mut Head) -> Result<Vec<Task>, Failure> {
+fn of_shards(args: &PlanArgs, memory: MemorySize, head: &mut Head) -> Result<Vec<Task>, Failure> {
     let command = parse(line(args), &["-o", "0.part", "--shard", "0/1"])?;
     let mut inputs = match &command {
         Command::Render(_) => {
@@ -197,15 +206,11 @@ fn of_shards(args: &PlanArgs, head: &mut Head) -> Result<Vec<Task>, Failure> {
             ));
         }
     };
-    if args.scene.is_file() {
-        let (_, xxh3) = checksum(&args.scene)?;
-        inputs.insert(
-            0,
-            Input {
-                path: head.scene.clone(),
-                xxh3,
-            },
-        );
+    if !is_built_in(&args.scene) {
+        for Input { path, xxh3 } in inputs_of(&args.scene, Some(memory))? {
+            let path = from(&args.output, &path)?;
+            inputs.push(Input { path, xxh3 });
+        }
     }
     head.levels = vec![args.tasks as usize];
     let task = |index: u32| {
@@ -305,6 +310,15 @@ impl<'a> Squares<'a> {
             .collect()
     }
 
+    /// Rows and columns of squares.
+    fn chunks(&self) -> [Vec<usize>; 2] {
+        let sizes = |axis: usize| {
+            let count = 0..self.counts[axis];
+            count.map(|at| self.tile([at, at]).size[axis]).collect()
+        };
+        [sizes(1), sizes(0)]
+    }
+
     /// The sweep of a quarter of the steps over a square.
     fn sweep(&self, place: [usize; 2], (quarter, steps): &(usize, Vec<[i32; 2]>)) -> Task {
         let (own, name) = (self.tile(place), format!("{}q{quarter}", id(place)));
@@ -364,13 +378,13 @@ fn of_tiles(args: &PlanArgs, memory: MemorySize, head: &mut Head) -> Result<Vec<
     let mut common = settle_files(&bake, &mut head.command)?;
     bake.args().0.check()?;
     let raster = tile::open(&args.scene, memory)?;
-    let Tiling { directions, bands } = bake.args().0.tiling(&raster)?;
+    let tiling = bake.args().0.tiling(&raster)?;
     let (_, xxh3) = checksum(&args.scene)?;
     let path = head.scene.clone();
     common.insert(0, Input { path, xxh3 });
-    let rates = Rates::measure(&bake, &raster, &directions, memory)?;
+    let rates = Rates::measure(&line(args), &raster, &tiling, memory)?;
     let squares = Squares::new(args, raster.index(), common, &rates)?;
-    let quarters = tile::quarters(&directions);
+    let quarters = tile::quarters(&tiling.directions);
     let mut levels: BTreeMap<usize, Vec<Task>> = BTreeMap::new();
     for quarter in &quarters {
         for place in squares.places() {
@@ -398,10 +412,11 @@ fn of_tiles(args: &PlanArgs, memory: MemorySize, head: &mut Head) -> Result<Vec<
         });
         head.bill.bytes_read += bytes;
         let cells = own.size[0] as u64 * own.size[1] as u64;
-        head.bill.bytes_written += 4 * cells * bands.len() as u64;
+        head.bill.bytes_written += 4 * cells * tiling.bands.len() as u64;
         head.bill.cells += cells;
     }
-    head.bands = bands;
+    head.chunks = squares.chunks();
+    head.bands = tiling.bands;
     let levels: Vec<Vec<Task>> = levels.into_values().chain([last]).collect();
     head.levels = levels.iter().map(Vec::len).collect();
     Ok(levels.into_iter().flatten().collect())

@@ -4,18 +4,45 @@ use std::path::{Path, PathBuf};
 
 use antumbra_image::atomic_write;
 use antumbra_load::MemorySize;
-use antumbra_raster::{Purpose, Quantity, VrtTile, read_all, vrt_text};
+use antumbra_raster::{Quantity, VrtTile, read_numbers, vrt_text};
 
 use super::{PLAN, Part, Plan, State};
 use crate::args::MergeArgs;
 use crate::bake::{self, tile};
 use crate::exit::{Failure, tell};
+use crate::input::check_answers;
 use crate::output::{Files, is_one_of};
 use crate::{archive, interrupt};
 
 /// Whether a file is a plan, by its first bytes.
 pub fn is_plan(path: &Path) -> bool {
     archive::starts_with(path, format!("{{\"schema\":\"{PLAN}\"").as_bytes())
+}
+
+/// Values of a raster of so many columns and rows, of files with parts of it; NaN between them. Numbers are as they were written,
+/// whatever the unit of heights is in their coordinate system.
+pub fn join(size: [usize; 2], parts: &[VrtTile], memory: MemorySize) -> Result<Vec<f32>, Failure> {
+    let bytes = 4 * size[0] as u64 * size[1] as u64;
+    check_answers("results", 2 * bytes)?;
+    let mut values = vec![f32::NAN; size[0] * size[1]];
+    for part in parts {
+        interrupt::check()?;
+        let found = read_numbers(&part.path, memory.bytes());
+        let found = found.map_err(|error| Failure::Data(error.to_string()))?;
+        if [found.grid.width, found.grid.height] != part.size {
+            return Err(Failure::Data(format!(
+                "{}: it has another size than in the plan",
+                part.path.display()
+            )));
+        }
+        let ([left, top], [columns, _]) = (part.at, part.size);
+        for (row, found) in found.values.chunks_exact(columns).enumerate() {
+            let own = &mut values[(top + row) * size[0] + left..][..columns];
+            let cells = own.iter_mut().zip(found);
+            cells.for_each(|(own, &found)| *own = found as f32);
+        }
+    }
+    Ok(values)
 }
 
 /// Joins the results of a plan. Returns the parts of a rendering or a bake, which their own command joins.
@@ -34,7 +61,7 @@ pub fn merge(args: &MergeArgs, memory: MemorySize) -> Result<Option<Vec<PathBuf>
                 task.id
             )));
         }
-        let path = plan.result(task);
+        let path = std::path::absolute(plan.result(task)).map_err(Failure::work)?;
         match task.part {
             Part::Sweep { .. } => {}
             Part::Shard(_) => paths.push(path),
@@ -57,22 +84,18 @@ pub fn merge(args: &MergeArgs, memory: MemorySize) -> Result<Option<Vec<PathBuf>
         files.writes("--output", output)?;
     }
     files.check()?;
+    let raster = tile::open(&plan.beside(&plan.head.scene), memory)?;
+    let whole = raster.index().whole();
+    let grid = raster.grid(&whole)?;
     let _writing = interrupt::writing();
     for output in &args.output {
         if is_one_of(output, &["vrt"]) {
-            let raster = tile::open(&plan.beside(&plan.head.scene), memory)?;
-            let whole = raster.index().whole();
-            let grid = raster.grid(&whole)?;
-            let text = vrt_text(output, &grid, &bands, &tiles);
+            let path = std::path::absolute(output).map_err(Failure::work)?;
+            let text = vrt_text(&path, &grid, &bands, &tiles);
             atomic_write(output, |file| file.write_all(text.as_bytes()))?;
         } else if bands.len() == 1 {
-            let paths: Vec<PathBuf> = tiles.iter().map(|tile| tile.path.clone()).collect();
-            let mosaic = read_all(&paths, memory.bytes(), Purpose::Values);
-            let mosaic = mosaic
-                .map_err(|error| Failure::Scene(error.to_string()))?
-                .raster;
-            let values: Vec<f32> = mosaic.values.iter().map(|&value| value as f32).collect();
-            bake::write_values(output, &mosaic.grid, &values, &bands)?;
+            let values = join(whole.size, &tiles, memory)?;
+            bake::write_values(output, &grid, &values, &bands)?;
         } else {
             let reason = format!(
                 "tiles with {} bands are joined as a .vrt, which names them",

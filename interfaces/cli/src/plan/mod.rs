@@ -21,7 +21,9 @@ use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::exit::Failure;
+use crate::farm::is_built_in;
 use crate::input;
+use crate::output::text;
 
 pub use check::check;
 pub use make::make;
@@ -44,6 +46,8 @@ pub struct Head {
     folder: PathBuf,
     /// Name and unit of each band of the tiles.
     bands: Vec<[String; 2]>,
+    /// Rows and columns of tiles, from north to south and from west to east: numbers of cells, as chunks of dask.
+    chunks: [Vec<usize>; 2],
     /// Numbers of tasks that only need those before: so many first, so many next, and so on.
     levels: Vec<usize>,
     bill: Bill,
@@ -228,14 +232,18 @@ impl Plan {
             .command
             .split_first()
             .map_or(("", &[][..]), |(name, flags)| (&**name, flags));
-        let scene = self.beside(&self.head.scene).to_string_lossy().into_owned();
-        let line = ["antumbra".to_owned(), name.to_owned(), scene];
+        let scene = match is_built_in(&self.head.scene) {
+            true => self.head.scene.clone(),
+            false => self.beside(&self.head.scene),
+        };
+        let line = ["antumbra".to_owned(), name.to_owned(), text(&scene)];
         line.into_iter().chain(flags.iter().cloned()).collect()
     }
 
     /// A number that changes with all that the result of a task is made of.
     fn key(&self, task: &Task) -> Result<String, Failure> {
-        let of = (&self.head.command, &task.part, &task.after, &task.inputs);
+        let Head { scene, command, .. } = &self.head;
+        let of = (scene, command, &task.part, &task.after, &task.inputs);
         let text = serde_json::to_string(&of).map_err(Failure::work)?;
         Ok(sum_text(xxh3_64(text.as_bytes())))
     }
@@ -253,6 +261,15 @@ impl Plan {
             _ => State::Disagreeing,
         })
     }
+}
+
+/// A file as a plan names it: relative to the folder of the plan if it is in it.
+fn from(plan: &Path, path: &Path) -> Result<PathBuf, Failure> {
+    let absolute = |path| std::path::absolute(path).map_err(Failure::work);
+    let (plan, path) = (absolute(plan)?, absolute(path)?);
+    let folder = plan.parent().unwrap_or(Path::new(""));
+    let inside = path.strip_prefix(folder).map(Path::to_path_buf);
+    Ok(inside.unwrap_or(path))
 }
 
 /// A checksum as text.

@@ -10,12 +10,14 @@ use std::time::Instant;
 use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
-use antumbra_raster::{Grid, Quantity};
+use antumbra_raster::{Quantity, VrtTile};
+use antumbra_render::Snapshot;
 use antumbra_terrain::Tile;
 use antumbra_tiles::Indexed;
 
 use super::make::parse;
-use super::{Input, Part, Plan, RECEIPT, Receipt, State, Task, checksum, sum_text};
+use super::merge::join;
+use super::{Input, Part, Plan, RECEIPT, Receipt, State, Task, checksum, from, sum_text};
 use crate::args::{Command, RunArgs};
 use crate::bake::tile::{self, TileWork};
 use crate::bake::{self, run_tile};
@@ -24,13 +26,13 @@ use crate::output::text;
 use crate::version::VERSION;
 use crate::{interrupt, render};
 
-/// Most cells on a side of what is computed at once, where a tile needs nothing of others but heights.
+/// Most cells on a side of what is computed at once, of sums over light.
 pub const PART: usize = 1024;
 
 /// Runs the command.
 pub fn run(args: &RunArgs, memory: MemorySize) -> Result<(), Failure> {
     let plan = Plan::read(&args.plan, &args.task)?;
-    args.machine.start_threads()?;
+    args.threads.start()?;
     fs::create_dir_all(plan.folder()).map_err(Failure::work)?;
     let runner = Runner {
         plan: &plan,
@@ -139,19 +141,14 @@ impl Runner<'_> {
             Part::Shard(shard) => self.shard(shard, &own)?,
         }
         if let Some(raster) = self.raster.get() {
-            let known = |path: &Path| inputs.iter().any(|input| input.path == path);
-            let files = raster
-                .read_files()
-                .into_iter()
-                .map(|number| &raster.index().files[number]);
-            let more: Vec<Input> = files
-                .filter(|file| !known(&file.path))
-                .map(|file| Input {
-                    path: file.path.clone(),
-                    xxh3: sum_text(file.xxh3),
-                })
-                .collect();
-            inputs.extend(more);
+            for number in raster.used_files() {
+                let file = &raster.index().files[number];
+                let path = from(&plan.path, &file.path)?;
+                if inputs.iter().all(|input| input.path != path) {
+                    let xxh3 = sum_text(file.xxh3);
+                    inputs.push(Input { path, xxh3 });
+                }
+            }
         }
         let (bytes, xxh3) = checksum(&own)?;
         let key = plan.key(task)?;
@@ -160,6 +157,9 @@ impl Runner<'_> {
             let is_there = checksum(&result)
                 .is_ok_and(|found| found == (other.bytes, other.output.xxh3.clone()));
             if is_there && other.output.xxh3 != xxh3 {
+                if is_share(task) && content(&own)? == content(&result)? {
+                    return fs::remove_file(&own).map_err(Failure::work);
+                }
                 return Err(Failure::Work(format!(
                     "{}: its result has the checksum {xxh3}, and another run of the same task found {}; the other one is left as it is",
                     task.id, other.output.xxh3
@@ -206,7 +206,7 @@ impl Runner<'_> {
         }
     }
 
-    /// Computes a tile, part by part if it is large and needs no sweeps.
+    /// Computes a tile, part by part if it is large and takes much memory.
     fn tile(
         &self,
         task: &Task,
@@ -221,38 +221,33 @@ impl Runner<'_> {
                     .join(format!("{}q{quarter}.sweep", task.id))
             })
             .collect();
+        // Only sums of light take much memory for each cell.
+        let has_sums = self
+            .plan
+            .head
+            .command
+            .first()
+            .is_some_and(|name| name == "sun");
         let is_small = tile.size.iter().all(|&cells| cells <= PART);
-        if is_small || !task.after.is_empty() {
-            return self.bake(&TileWork::new(raster, tile, (None, &sweeps)), output);
-        }
-        let [[name, unit]] = &self.plan.head.bands[..] else {
-            return self.bake(&TileWork::new(raster, tile, (None, &sweeps)), output);
+        let bands = match &self.plan.head.bands[..] {
+            [[name, unit]] if has_sums && !is_small => [Quantity { name, unit }],
+            _ => return self.bake(&TileWork::new(raster, tile, (None, &sweeps)), output),
         };
-        let mut values = vec![f32::NAN; tile.size[0] * tile.size[1]];
+        let mut parts = Vec::new();
         for top in (0..tile.size[1]).step_by(PART) {
             for left in (0..tile.size[0]).step_by(PART) {
                 let size = [PART.min(tile.size[0] - left), PART.min(tile.size[1] - top)];
                 let at = [tile.at[0] + left as i64, tile.at[1] + top as i64];
-                let path = scratch.join("part.npy");
-                self.bake(
-                    &TileWork::new(raster, Tile { at, size }, (None, &[])),
-                    &path,
-                )?;
-                let bytes = fs::read(&path).map_err(Failure::work)?;
-                // Numbers of single precision are at the end.
-                let numbers = &bytes[bytes.len() - 4 * size[0] * size[1]..];
-                let rows = numbers.chunks_exact(4 * size[0]);
-                for (row, numbers) in rows.enumerate() {
-                    let own = &mut values[(top + row) * tile.size[0] + left..][..size[0]];
-                    let (words, _) = numbers.as_chunks::<4>();
-                    own.iter_mut()
-                        .zip(words)
-                        .for_each(|(own, word)| *own = f32::from_le_bytes(*word));
-                }
+                let path = scratch.join(format!("{top}-{left}.tif"));
+                let part = Tile { at, size };
+                self.bake(&TileWork::new(raster, part, (None, &[])), &path)?;
+                let at = [left, top];
+                parts.push(VrtTile { path, at, size });
             }
         }
-        let grid: Grid = raster.grid(&tile)?;
-        bake::write_values(output, &grid, &values, &[Quantity { name, unit }])
+        let values = join(tile.size, &parts, self.memory)?;
+        let grid = raster.grid(&tile)?;
+        bake::write_values(output, &grid, &values, &bands)
     }
 
     fn sweep(&self, task: &Task, tile: Tile, part: (usize, &Path)) -> Result<(), Failure> {
@@ -276,6 +271,21 @@ impl Runner<'_> {
             _ => Err(Failure::usage("a share is of a rendering or a bake")),
         }
     }
+}
+
+fn is_share(task: &Task) -> bool {
+    matches!(task.part, Part::Shard(_))
+}
+
+/// What a share holds, without how long that took.
+fn content(path: &Path) -> Result<Vec<u8>, Failure> {
+    let bytes = fs::read(path).map_err(Failure::work)?;
+    let Ok((identity, share)) = Snapshot::from_bytes(&bytes) else {
+        return Ok(bytes);
+    };
+    let mut content = Vec::new();
+    let written = share.without_effort().write(&identity, &mut content);
+    written.map(|()| content).map_err(Failure::work)
 }
 
 fn tile_of([column, row, columns, rows]: [usize; 4]) -> Tile {

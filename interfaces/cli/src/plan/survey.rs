@@ -2,13 +2,15 @@
 
 use antumbra_lab::count;
 use antumbra_load::raster_warnings;
-use antumbra_tiles::{Index, Indexed};
+use antumbra_raster::Parts;
+use antumbra_tiles::Index;
 
 use crate::args::IndexArgs;
 use crate::bake::tile::is_index;
 use crate::exit::{Failure, tell};
 use crate::output::Files;
 use crate::progress::Progress;
+use crate::scenes;
 
 /// Runs the command.
 pub fn survey(args: &IndexArgs) -> Result<(), Failure> {
@@ -22,15 +24,15 @@ pub fn survey(args: &IndexArgs) -> Result<(), Failure> {
     files.reads_all(&rasters)?;
     files.writes("--output", output)?;
     files.check()?;
-    args.machine.start_threads()?;
+    // All files have one unit of heights, or there is no index of them.
+    let first = Parts::open(&rasters[0]).map_err(|error| Failure::Scene(error.to_string()))?;
+    let warnings = raster_warnings(&rasters[0], first.grid(), first.height_factor());
+    scenes::tell_warnings(&warnings)?;
+    args.threads.start()?;
     let name = output.to_string_lossy();
     let progress = Progress::new(name.as_ref());
     let index = Index::make(&rasters, output, &progress)?;
     progress.finish();
-    let grid = Indexed::open(output, 0)?.grid(&index.whole())?;
-    for warning in raster_warnings(&rasters[0], &grid, index.height_factor) {
-        tell(format_args!("{warning}"));
-    }
     let mut text = format!(
         "{name}: {} files are one raster of {} x {} cells, {} with data",
         index.files.len(),

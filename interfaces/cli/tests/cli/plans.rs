@@ -1,9 +1,10 @@
 //! Plans: tiles and shares of jobs, whatever is cut, in any order, and whatever is lost.
 
-use std::fs;
+use std::ffi::OsString;
 use std::path::Path;
+use std::{fs, thread};
 
-use antumbra_raster::{Crs, Grid, Quantity, write};
+use antumbra_raster::{Crs, Grid, Quantity, read_numbers, write};
 use antumbra_testkit::Rng;
 
 use crate::support::Place;
@@ -187,6 +188,8 @@ fn tiles_have_the_bits_of_the_whole_for_any_partition_and_order() {
             let plan = format!("{number}.jsonl");
             let head = ["plan", "all.index", "-o", &plan, "--tile", &side, name];
             place.run(&[&head[..], flags].concat()).expect(0);
+            // What is computed for the bill is written elsewhere.
+            assert!(!place.path("tile.tif").exists());
             run_in_any_order(&place, &plan, &mut random);
             place.run(&["check", &plan]).expect(0);
             place
@@ -394,6 +397,100 @@ fn other_inputs_are_refused_by_name() {
 }
 
 #[test]
+fn results_keep_their_numbers_where_heights_are_in_feet() {
+    let place = Place::empty();
+    let size = [96, 64];
+    let mut grid = Grid::north_up(size, [600_000.0, 5_340_000.0], 2.0);
+    let mut crs = Crs::from_epsg(25_832).expect("a code");
+    // Heights of EPSG:6360, in feet.
+    crs.directory.extend([4096, 0, 1, 6360]);
+    crs.directory[3] += 1;
+    grid.crs = Some(crs);
+    // A whole tile has no data, and a wall stands beside it.
+    let height = |cell: usize| match (cell % 96, cell / 96) {
+        (0..=31, 0..=31) => f32::NAN,
+        (60, _) => 90.0,
+        _ => 3.0,
+    };
+    let heights: Vec<f32> = (0..96 * 64).map(height).collect();
+    let bytes = write("feet.tif".as_ref(), &grid, &heights, &[HEIGHT]).expect("a raster");
+    place.write("feet.tif", bytes);
+    place
+        .run(&["index", "feet.tif", "-o", "feet.index"])
+        .expect(0);
+    let day = ["--cells", "--from", "2025-06-21", "--to", "2025-06-21"];
+    place
+        .run(&[&["sun", "feet.tif", "-o", "whole.tif"][..], &day].concat())
+        .expect(0);
+    let head = [
+        "plan",
+        "feet.index",
+        "-o",
+        "sun.jsonl",
+        "--tile",
+        "32",
+        "sun",
+    ];
+    place.run(&[&head[..], &day].concat()).expect(0);
+    place.run(&["run", "sun.jsonl"]).expect(0);
+    fs::create_dir_all(place.path("maps")).expect("a folder");
+    place
+        .run(&["merge", "sun.jsonl", "-o", "sun.tif", "-o", "maps/sun.vrt"])
+        .expect(0);
+    let numbers = |name: &str| read_numbers(&place.path(name), u64::MAX).expect("a raster");
+    let whole = numbers("whole.tif");
+    let most = whole.values.iter().copied().fold(0.0, f64::max);
+    assert!(
+        most > 12.0,
+        "hours of a day in June, not of it in feet: {most}"
+    );
+    let found = numbers("sun.tif");
+    assert_eq!(found.grid, whole.grid);
+    let same = |(a, b): (&f64, &f64)| a.is_nan() && b.is_nan() || a == b;
+    assert!(found.values.iter().zip(&whole.values).all(same));
+    assert!(whole.values[0].is_nan());
+    let text = fs::read_to_string(place.path("maps/sun.vrt")).expect("a text");
+    let tile = place.path("sun.jsonl.results/r0000c0001.tif");
+    assert!(
+        text.contains(&tile.display().to_string()),
+        "names are absolute: {text}"
+    );
+}
+
+#[test]
+fn receipts_name_what_a_task_has_read() {
+    let place = Place::empty();
+    raster(&place, &mut Rng::new(7));
+    place.run(&["index", "parts", "-o", "all.index"]).expect(0);
+    let job = ["horizon", "--cells", "--azimuths", "1", "--first", "50"];
+    let head = ["plan", "all.index", "-o", "plan.jsonl", "--tile", "16"];
+    place.run(&[&head[..], &job].concat()).expect(0);
+    // Under another name of the same folder.
+    place.run(&["run", "./plan.jsonl"]).expect(0);
+    let mut numbers = Vec::new();
+    for (id, _) in tasks(&place.path("plan.jsonl")) {
+        let receipt = place.json(&format!("plan.jsonl.results/{id}.receipt.json"));
+        // Relative or absolute, a file is there once.
+        let name = |path: &serde_json::Value| {
+            let path = Path::new(path.as_str().expect("a name"));
+            path.file_name().expect("a name").to_owned()
+        };
+        let inputs = receipt["inputs"].as_array().expect("a list").iter();
+        let paths: Vec<OsString> = inputs.map(|input| name(&input["path"])).collect();
+        let mut once = paths.clone();
+        once.sort_unstable();
+        once.dedup();
+        assert_eq!(once.len(), paths.len(), "{paths:?}");
+        numbers.push(paths.len());
+    }
+    let last = numbers.last().copied();
+    assert!(
+        last < Some(5),
+        "only what the last one has read, not all of the run: {numbers:?}"
+    );
+}
+
+#[test]
 fn shares_of_other_scenes_are_plans_too() {
     let place = Place::empty();
     let job = ["--resolution", "32x18", "--spp", "2"];
@@ -415,6 +512,68 @@ fn shares_of_other_scenes_are_plans_too() {
     place.run(&["merge", "city.jsonl", "-o", "b.png"]).expect(0);
     let [a, b] = ["a.png", "b.png"].map(|name| place.image(name));
     assert!(a == b, "the same picture");
+    // Another scene of the program is another plan, whatever folder plans are in.
+    let head = [
+        "plan",
+        "builtin:city:3000",
+        "-o",
+        "city.jsonl",
+        "--tasks",
+        "3",
+        "render",
+    ];
+    place.run(&[&head[..], &job].concat()).expect(0);
+    let check = place.run(&["check", "city.jsonl"]).expect(1);
+    assert!(check.stderr.contains("3 stale"), "{}", check.stderr);
+    fs::create_dir_all(place.path("plans")).expect("a folder");
+    let head = [
+        "plan",
+        "builtin:city:2000",
+        "-o",
+        "plans/city.jsonl",
+        "--tasks",
+        "1",
+        "render",
+    ];
+    place.run(&[&head[..], &job].concat()).expect(0);
+    place.run(&["run", "plans/city.jsonl"]).expect(0);
+    // Two runs of one share need not take as long, and agree.
+    let head = ["plan", "builtin:city:2000", "-o", "twice.jsonl"];
+    let long = ["render", "--resolution", "200x120", "--spp", "32"];
+    place
+        .run(&[&head[..], &["--tasks", "1"], &long].concat())
+        .expect(0);
+    thread::scope(|scope| {
+        let run = || place.run(&["run", "twice.jsonl"]).expect(0);
+        let other = scope.spawn(run);
+        run();
+        other.join().expect("the other one ends well");
+    });
+    place.run(&["check", "twice.jsonl"]).expect(0);
+    // A file that the scene includes is one of its inputs.
+    let plane =
+        "Shape \"trianglemesh\" \"integer indices\" [0 1 2] \"point P\" [-9 -9 5 9 -9 5 0 9 5]";
+    place.write("plane.pbrt", plane);
+    let scene = "Camera \"perspective\"\nWorldBegin\nLightSource \"infinite\"\nInclude \"plane.pbrt\"\nWorldEnd\n";
+    place.write("scene.pbrt", scene);
+    let head = [
+        "plan",
+        "scene.pbrt",
+        "-o",
+        "scene.jsonl",
+        "--tasks",
+        "1",
+        "render",
+    ];
+    place.run(&[&head[..], &job].concat()).expect(0);
+    place.run(&["run", "scene.jsonl"]).expect(0);
+    place.write("plane.pbrt", plane.replace('5', "6"));
+    place.run(&[&head[..], &job].concat()).expect(0);
+    place.run(&["check", "scene.jsonl"]).expect(1);
+    let plan = place
+        .run(&["plan", "-", "-o", "other.jsonl", "render"])
+        .expect(2);
+    assert!(plan.stderr.contains("standard input"), "{}", plan.stderr);
     // Flags that would write a file of each task are refused, and so are commands without tasks.
     for (more, reason) in [
         (&["render", "--json", "a.json"][..], "--json"),

@@ -7,6 +7,7 @@ use antumbra_image::Image;
 use serde::{Deserialize, Serialize};
 
 use super::archive::{self, Kind};
+use super::sums::Effort;
 use super::{Identity, Sums, TileWork};
 use crate::Error;
 use crate::film::{Film, Rules, Shard, Tiles, batch_depth};
@@ -195,6 +196,17 @@ impl Snapshot {
     /// Wall-clock seconds of rendering so far, summed over machines.
     pub fn seconds(&self) -> f64 {
         self.earlier.seconds
+    }
+
+    /// The same state without its effort, which is another for each run.
+    #[must_use]
+    pub fn without_effort(mut self) -> Self {
+        self.earlier = Earlier::default();
+        let begun = self.sums.begun.values_mut();
+        let all = begun.map(|tile| &mut tile.effort);
+        all.chain([&mut self.sums.effort])
+            .for_each(|effort| *effort = Effort::default());
+        self
     }
 
     /// Writes the bytes of a file. Equal snapshots have equal bytes.

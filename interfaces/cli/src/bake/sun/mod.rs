@@ -264,6 +264,7 @@ impl Baking for SunArgs {
         Ok(Tiling {
             directions: Vec::new(),
             bands: vec![[name, unit].map(str::to_owned)],
+            eyes: Vec::new(),
         })
     }
 

@@ -135,7 +135,7 @@ pub fn tiling(args: &VisibleArgs, raster: &Indexed) -> Result<Tiling, Failure> {
         let reason = "tiles of an index are for --viewshed of its cells";
         return Err(Failure::usage(reason));
     }
-    tile::settle(raster, &super::asked(args))?;
+    tile::settle(raster, &args.scene, &super::asked(args))?;
     let index = raster.index();
     let table = Table::read(args, |point| TileWork::observer(raster, point))?;
     super::warn_of_far(
@@ -147,6 +147,11 @@ pub fn tiling(args: &VisibleArgs, raster: &Indexed) -> Result<Tiling, Failure> {
     Ok(Tiling {
         directions: Vec::new(),
         bands: vec![[args.show.name().to_owned(), unit]],
+        eyes: table
+            .observers
+            .iter()
+            .map(|eye| tile::around(eye.place))
+            .collect(),
     })
 }
 
