@@ -169,7 +169,7 @@ impl Sample<'_> {
         let Command::Bake(bake) = parse(self.line.to_vec(), &["-o", &output])? else {
             return Ok([0.0; 2]);
         };
-        // With the checksums of its result, and of the sweeps that it needs.
+        // With the checksums of its result, and of the sweeps whose angles it needs.
         let time = |work: &TileWork<'_>, files: &[&Path]| {
             let start = thread_seconds();
             quietly(Loudness::Quiet, || {
@@ -187,7 +187,7 @@ impl Sample<'_> {
             let part = Some((*quarter, &*sweeps[*quarter]));
             let mut work = TileWork::new(self.raster, tile, (part, &[]));
             work.is_sample = true;
-            swept += time(&work, &[&*sweeps[*quarter]; 4])?;
+            swept += time(&work, &[&*sweeps[*quarter]])?;
         }
         let work = TileWork::new(self.raster, tile, (None, &sweeps));
         let files = self.quarters.iter().map(|(quarter, _)| &*sweeps[*quarter]);

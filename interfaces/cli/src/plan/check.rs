@@ -33,7 +33,7 @@ pub fn check(args: &CheckArgs) -> Result<(), Failure> {
         disagreeing: Vec::new(),
     };
     for task in &plan.tasks {
-        let list = match plan.state(task)? {
+        let list = match plan.state(task, true)? {
             State::Done => {
                 found.done += 1;
                 continue;

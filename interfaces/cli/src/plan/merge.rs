@@ -54,7 +54,7 @@ pub fn merge(args: &MergeArgs, memory: MemorySize) -> Result<Option<Vec<PathBuf>
     let (mut paths, mut tiles) = (Vec::new(), Vec::new());
     for task in &plan.tasks {
         interrupt::check()?;
-        if plan.state(task)? != State::Done {
+        if plan.state(task, true)? != State::Done {
             let name = path.display();
             return Err(Failure::Work(format!(
                 "{name}: the task {} is not done; antumbra check {name} names all of these",

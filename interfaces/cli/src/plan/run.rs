@@ -42,7 +42,7 @@ pub fn run(args: &RunArgs, memory: MemorySize) -> Result<(), Failure> {
     let (mut done, mut before) = (0, 0);
     for task in &plan.tasks {
         interrupt::check()?;
-        match plan.state(task)? {
+        match plan.state(task, true)? {
             State::Done => before += 1,
             _ => {
                 runner.run(task)?;
@@ -97,7 +97,9 @@ impl Runner<'_> {
             .iter()
             .filter_map(|id| plan.needed.get_key_value(id))
         {
-            let state = match plan.state(needed)? {
+            // Sweeps read hulls of others, which have checksums of their own, and not the angles.
+            let is_read = !matches!(task.part, Part::Sweep { .. });
+            let state = match plan.state(needed, is_read)? {
                 State::Done => continue,
                 State::Missing => "is not there",
                 State::Stale => "is of another plan",

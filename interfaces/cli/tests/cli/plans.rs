@@ -325,16 +325,35 @@ fn sweeps_that_a_task_needs_are_checked() {
     let text = fs::read_to_string(place.path(&receipt)).expect("a receipt");
     let bytes = fs::read(place.path(&result)).expect("a sweep");
     fs::remove_file(place.path(&format!("plan.jsonl.results/{id}.receipt.json"))).expect("removed");
-    // A sweep with other angles, and one of another plan.
+    // A sweep whose hulls are damaged, one that is cut short, and one of another plan.
     let mut other = bytes.clone();
-    *other.last_mut().expect("a byte") ^= 1;
+    other[300] ^= 1;
     place.write(&result, other);
+    let told = run(65);
+    assert!(
+        told.contains(&result) && told.contains("as they were written"),
+        "{told}"
+    );
+    place.write(&result, &bytes[1..]);
     assert!(run(1).contains("which is damaged"));
-    place.write(&result, bytes);
+    place.write(&result, &bytes);
     place.write(&receipt, text.replace("\"key\":\"", "\"key\":\"0"));
     assert!(run(1).contains("which is of another plan"));
     place.write(&receipt, text);
     run(0);
+    // Tiles need the angles, too.
+    let (tile, _) = all.last().expect("a tile");
+    fs::remove_file(place.path(&format!("plan.jsonl.results/{tile}.receipt.json")))
+        .expect("removed");
+    let result = format!("plan.jsonl.results/{tile}q0.sweep");
+    let mut bytes = fs::read(place.path(&result)).expect("a sweep");
+    *bytes.last_mut().expect("a byte") ^= 1;
+    place.write(&result, bytes);
+    let told = place
+        .run(&["run", "plan.jsonl", "--task", tile])
+        .expect(1)
+        .stderr;
+    assert!(told.contains("which is damaged"), "{told}");
 }
 
 #[test]
