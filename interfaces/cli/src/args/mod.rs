@@ -85,6 +85,14 @@ Scene: a .pbrt file, a mesh (.ply, .obj, .stl, .gltf or .glb, with its materials
 has lights), a height raster (.tif, .asc, .npy, .vrt, or a folder of tiles), or a built-in scene as builtin:NAME[:TRIANGLES], such as builtin:city or builtin:city:20000. - reads a \
 .pbrt file from the standard input";
 
+/// The same of commands whose scene other machines read, too, so that it is no standard input.
+pub fn scene_of_all() -> String {
+    let scene = SCENE_LONG.split(". -").next().unwrap_or(SCENE_LONG);
+    format!(
+        "An index of height rasters, or any scene that other machines read under its name. {scene}"
+    )
+}
+
 /// The same of commands that take several rasters.
 pub fn rasters_long() -> String {
     format!(

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{SCENE, SCENE_LONG, ThreadArgs, heading};
+use super::{SCENE, ThreadArgs, heading, scene_of_all};
 use crate::json::Destination;
 
 /// Flags of `index`.
@@ -27,7 +27,7 @@ pub struct IndexArgs {
 /// Flags of `plan`.
 #[derive(Debug, Args)]
 pub struct PlanArgs {
-    #[arg(help = SCENE, long_help = format!("An index of height rasters, or any scene that other machines read under its name. {SCENE_LONG}"))]
+    #[arg(help = SCENE, long_help = scene_of_all())]
     pub scene: PathBuf,
     /// Plan to write, such as plan.jsonl
     ///

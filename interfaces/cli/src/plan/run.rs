@@ -159,7 +159,7 @@ impl Runner<'_> {
             let is_there = checksum(&result)
                 .is_ok_and(|found| found == (other.bytes, other.output.xxh3.clone()));
             if is_there && other.output.xxh3 != xxh3 {
-                if is_share(task) && content(&own)? == content(&result)? {
+                if lock.is_some() && content(&own)? == content(&result)? {
                     return fs::remove_file(&own).map_err(Failure::work);
                 }
                 return Err(Failure::Work(format!(
@@ -273,10 +273,6 @@ impl Runner<'_> {
             _ => Err(Failure::usage("a share is of a rendering or a bake")),
         }
     }
-}
-
-fn is_share(task: &Task) -> bool {
-    matches!(task.part, Part::Shard(_))
 }
 
 /// What a share holds, without how long that took.
