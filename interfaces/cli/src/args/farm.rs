@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 
-use super::{SCENE, SCENE_LONG, heading};
+use super::{heading, scene_of_all};
 use crate::bake::BakeCommand;
 
 /// Commands of `farm`.
@@ -13,9 +13,10 @@ use crate::bake::BakeCommand;
 pub enum FarmCommand {
     /// Submit an array job of Slurm, and a job that merges
     ///
-    /// Every task computes one part of an image, or of a job of another command, and a dependent job merges them. Tasks that are preempted, lose
-    /// their machine or come near their time limit go on from their checkpoints. The dependent job submits again
-    /// what is missing. So does this command when it is given again. Prints the numbers of the jobs.
+    /// Makes a plan in the folder, or takes one that `plan` has made. Each of its levels is an array job that waits for the one before,
+    /// and a last job merges. Tasks that are preempted, lose their machine or come near their time limit go on from their checkpoints,
+    /// or begin again if they are tiles. The last job submits again what is missing. So does this command when it is given again.
+    /// Prints the numbers of the jobs.
     Slurm(SlurmArgs),
     /// Write a template by the Open Job Description
     ///
@@ -24,18 +25,15 @@ pub enum FarmCommand {
     Openjd(OpenjdArgs),
 }
 
-/// What machines share if nothing else is said.
-const PICTURE: &str = "render";
-
 /// Commands that many machines can share.
 fn jobs() -> Vec<&'static str> {
-    [&[PICTURE], BakeCommand::NAMES].concat()
+    [&["render"], BakeCommand::NAMES].concat()
 }
 
 /// Flags of everything that renders on many machines.
 #[derive(Debug, Args)]
 pub struct FarmArgs {
-    #[arg(help = SCENE, long_help = SCENE_LONG)]
+    #[arg(help = "Scene file, builtin:NAME[:TRIANGLES], or a plan", long_help = scene_of_all("For slurm a plan, of which all tasks that are not done are submitted, or an index of height rasters"))]
     pub scene: PathBuf,
     /// File to write: an image, or a result of the job
     ///
@@ -47,17 +45,17 @@ pub struct FarmArgs {
     /// As --lines of visible: a .csv of pairs, or a .ply of edges. The last task writes them.
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub lines: Option<PathBuf>,
-    #[arg(long = "command", help = BakeCommand::NAMES.join(", "), value_name = "COMMAND", value_parser = PossibleValuesParser::new(jobs()), default_value = PICTURE, hide_possible_values = true, help_heading = heading::JOB)]
-    pub job: String,
+    #[arg(long = "command", help = format!("{} [default: render]", BakeCommand::NAMES.join(", ")), value_name = "COMMAND", value_parser = PossibleValuesParser::new(jobs()), hide_possible_values = true, help_heading = heading::JOB)]
+    pub job: Option<String>,
     /// Standard error of every pixel's mean, as .exr
     #[arg(long, value_name = "FILE", help_heading = heading::OUTPUT)]
     pub stderr_image: Option<PathBuf>,
-    /// Number of parts, each a task
+    /// Number of parts, each a task [default: 4]
     #[arg(
-        long, value_name = "N", default_value_t = 4, help_heading = heading::JOB,
+        long, value_name = "N", help_heading = heading::JOB,
         value_parser = clap::value_parser!(u32).range(1..=100_000)
     )]
-    pub tasks: u32,
+    pub tasks: Option<u32>,
     /// Parts, checkpoints, logs [default: FILE.farm]
     ///
     /// Directory of the scripts as well. Every machine must see it.
@@ -78,7 +76,7 @@ pub struct FarmArgs {
 pub struct SlurmArgs {
     #[command(flatten)]
     pub farm: FarmArgs,
-    /// Option of sbatch for both jobs
+    /// Option of sbatch for all jobs
     ///
     /// As in --sbatch=--partition=night. May be given many times.
     #[arg(long, value_name = "OPTION", allow_hyphen_values = true, help_heading = heading::JOB)]

@@ -86,11 +86,9 @@ has lights), a height raster (.tif, .asc, .npy, .vrt, or a folder of tiles), or 
 .pbrt file from the standard input";
 
 /// The same of commands whose scene other machines read, too, so that it is no standard input.
-pub fn scene_of_all() -> String {
+pub fn scene_of_all(first: &str) -> String {
     let scene = SCENE_LONG.split(". -").next().unwrap_or(SCENE_LONG);
-    format!(
-        "An index of height rasters, or any scene that other machines read under its name. {scene}"
-    )
+    format!("{first}, or any scene that other machines read under its name. {scene}")
 }
 
 /// The same of commands that take several rasters.

@@ -27,7 +27,7 @@ pub struct IndexArgs {
 /// Flags of `plan`.
 #[derive(Debug, Args)]
 pub struct PlanArgs {
-    #[arg(help = SCENE, long_help = scene_of_all())]
+    #[arg(help = SCENE, long_help = scene_of_all("An index of height rasters"))]
     pub scene: PathBuf,
     /// Plan to write, such as plan.jsonl
     ///
@@ -48,7 +48,8 @@ pub struct PlanArgs {
     pub json: Option<Destination>,
     /// Command of every task, with its flags
     ///
-    /// Without its scene and its output: for example sun --cells --from 2025-01-01 --to 2025-12-31 --step 60.
+    /// Without its scene and its output: for example sun --cells --from 2025-01-01 --to 2025-12-31 --step 60. Parts of render --stderr-image FILE have what
+    /// merge --stderr-image needs.
     #[arg(
         required = true,
         trailing_var_arg = true,

@@ -1,5 +1,6 @@
 //! The steps that all bakes have in common.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -113,18 +114,28 @@ pub fn run(
     memory: MemorySize,
     parts: Option<&[PartFile]>,
 ) -> Result<(), Failure> {
-    run_some(args, memory, (parts, None))
+    run_some(args, memory, (parts, None), std::env::args_os().collect())
+}
+
+/// Runs a command for a share, in whose file this line is noted: `merge` gives it again.
+pub fn run_share(
+    args: &dyn Baking,
+    memory: MemorySize,
+    line: Vec<OsString>,
+) -> Result<(), Failure> {
+    run_some(args, memory, (None, None), line)
 }
 
 /// Runs a command for a tile of its raster.
 pub fn run_tile(args: &dyn Baking, memory: MemorySize, tile: &TileWork<'_>) -> Result<(), Failure> {
-    run_some(args, memory, (None, Some(tile)))
+    run_some(args, memory, (None, Some(tile)), Vec::new())
 }
 
 fn run_some(
     args: &dyn Baking,
     memory: MemorySize,
     (parts, tile): (Option<&[PartFile]>, Option<&TileWork<'_>>),
+    line: Vec<OsString>,
 ) -> Result<(), Failure> {
     let (scene, outputs, json, chunks) = args.shared();
     let isa = chunks.machine.isa()?;
@@ -145,6 +156,7 @@ fn run_some(
         memory,
         parts,
         tile,
+        line,
     };
     let maps = if args.is_picture() { &[] } else { outputs };
     let world_files = map::world_files(maps)?;
@@ -169,6 +181,8 @@ pub struct Bake<'a> {
     pub parts: Option<&'a [PartFile]>,
     /// The tile to compute instead of the whole.
     pub tile: Option<&'a TileWork<'a>>,
+    /// The command line, as files of chunks note it.
+    line: Vec<OsString>,
 }
 
 /// A job that was computed.
@@ -312,7 +326,7 @@ impl Bake<'_> {
     ) -> Result<Done<J::Found>, Failure> {
         let shard = self.chunks.shard;
         let share = shard.map_or([0, 1], |shard| [shard.index(), shard.count()]);
-        let mut work = Work::new(job, key, share, std::env::args_os().collect());
+        let mut work = Work::new(job, key, share, self.line.clone());
         input::check_answers(name, work.memory())?;
         let start = Instant::now();
         let progress = Progress::new(name);

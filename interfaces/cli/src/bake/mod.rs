@@ -38,7 +38,7 @@ use std::path::PathBuf;
 use crate::args::ChunkArgs;
 use crate::json::Destination;
 
-pub use command::{run, run_tile};
+pub use command::{run, run_share, run_tile};
 pub use raster::write_values;
 
 command::bakes! {

@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
-use antumbra_image::atomic_write;
 use antumbra_lab::count;
 use antumbra_load::MemorySize;
 use antumbra_raster::is_raster;
@@ -12,28 +11,22 @@ use antumbra_tiles::Index;
 use clap::Parser;
 
 use super::bill::{self, Rates};
-use super::{Bill, Head, Input, PLAN, Part, Task, checksum, from, sum_text};
+use super::{Bill, Head, Input, PLAN, Part, Plan, Task, checksum, from, line, sum_text};
 use crate::args::{Cli, Command, PlanArgs};
 use crate::bake::BakeCommand;
 use crate::bake::tile::{self, is_index};
 use crate::exit::{Failure, tell};
 use crate::farm::{check_flags, is_built_in};
 use crate::output::{Files, beside, text};
-use crate::{interrupt, json, scenes};
+use crate::{json, scenes};
 
-/// Runs the command.
-pub fn make(args: &PlanArgs, memory: MemorySize) -> Result<(), Failure> {
-    let mut files = Files::default();
+/// Makes a plan, which is not written.
+pub fn planned(args: &PlanArgs, memory: MemorySize) -> Result<Plan, Failure> {
     if args.scene == Path::new(scenes::STDIN) {
         let reason = "a plan names its scene: tasks need a file, not the standard input";
         return Err(Failure::usage(reason));
     }
     let is_built_in = is_built_in(&args.scene);
-    if !is_built_in {
-        files.reads("the scene", &args.scene)?;
-    }
-    files.writes("--output", &args.output)?;
-    files.check()?;
     let folder = match &args.folder {
         Some(folder) => folder.clone(),
         None => beside(&args.output, ".results").ok_or_else(|| {
@@ -68,15 +61,25 @@ pub fn make(args: &PlanArgs, memory: MemorySize) -> Result<(), Failure> {
     head.bill.tasks = tasks.len();
     head.bill.core_hours = sum(|task| task.seconds).map(|seconds| seconds / 3600.0);
     head.bill.memory = tasks.iter().filter_map(|task| task.memory).max();
-    let _writing = interrupt::writing();
-    atomic_write(&args.output, |file| {
-        serde_json::to_writer(&mut *file, &head)?;
-        for task in &tasks {
-            file.write_all(b"\n")?;
-            serde_json::to_writer(&mut *file, task)?;
-        }
-        file.write_all(b"\n")
-    })?;
+    Ok(Plan {
+        path: args.output.clone(),
+        head,
+        tasks,
+        needed: HashMap::new(),
+    })
+}
+
+/// Runs the command.
+pub fn make(args: &PlanArgs, memory: MemorySize) -> Result<(), Failure> {
+    let mut files = Files::default();
+    if !is_built_in(&args.scene) {
+        files.reads("the scene", &args.scene)?;
+    }
+    files.writes("--output", &args.output)?;
+    files.check()?;
+    let plan = planned(args, memory)?;
+    plan.write()?;
+    let head = &plan.head;
     json::write(&head.bill, args.json.as_ref())?;
     let Bill {
         tasks,
@@ -134,18 +137,6 @@ pub fn parse(line: Vec<String>, more: &[&str]) -> Result<Command, Failure> {
         .ok_or_else(|| Failure::usage("a plan needs a command"))
 }
 
-/// The command line of a plan that is made, without an output.
-fn line(args: &PlanArgs) -> Vec<String> {
-    let (name, flags) = args
-        .command
-        .split_first()
-        .map_or(("", &[][..]), |(name, flags)| (&**name, flags));
-    let line = ["antumbra", name].map(str::to_owned).into_iter();
-    line.chain([text(&args.scene)])
-        .chain(flags.iter().cloned())
-        .collect()
-}
-
 /// Names flags that would write files of their own, and makes names of files absolute. Returns the files that are read.
 fn settle_files(bake: &BakeCommand, command: &mut [String]) -> Result<Vec<Input>, Failure> {
     let [written, read] = bake.args().0.files();
@@ -193,10 +184,13 @@ fn inputs_of(path: &Path, scene: Option<MemorySize>) -> Result<Vec<Input>, Failu
 
 /// Shares of a rendering or of a bake.
 fn of_shards(args: &PlanArgs, memory: MemorySize, head: &mut Head) -> Result<Vec<Task>, Failure> {
-    let command = parse(line(args), &["-o", "0.part", "--shard", "0/1"])?;
+    let command = parse(
+        line(&args.scene, &args.command),
+        &["-o", "0.part", "--shard", "0/1"],
+    )?;
     let mut inputs = match &command {
-        Command::Render(_) => {
-            check_flags(args.command.get(1..).unwrap_or_default())?;
+        Command::Render(render) => {
+            check_flags(render)?;
             Vec::new()
         }
         Command::Bake(bake) => settle_files(bake, &mut head.command)?,
@@ -370,7 +364,7 @@ fn corners(Tile { at, size }: Tile) -> [usize; 4] {
 
 /// Tiles of a raster.
 fn of_tiles(args: &PlanArgs, memory: MemorySize, head: &mut Head) -> Result<Vec<Task>, Failure> {
-    let Command::Bake(bake) = parse(line(args), &["-o", "tile.tif"])? else {
+    let Command::Bake(bake) = parse(line(&args.scene, &args.command), &["-o", "tile.tif"])? else {
         let reason =
             "tiles of an index are for horizon and sun with --cells, and visible --viewshed";
         return Err(Failure::usage(reason));
@@ -382,7 +376,8 @@ fn of_tiles(args: &PlanArgs, memory: MemorySize, head: &mut Head) -> Result<Vec<
     let (_, xxh3) = checksum(&args.scene)?;
     let path = head.scene.clone();
     common.insert(0, Input { path, xxh3 });
-    let rates = Rates::measure(&line(args), &raster, &tiling, memory)?;
+    let command = line(&args.scene, &args.command);
+    let rates = Rates::measure(&command, &raster, &tiling, memory)?;
     let squares = Squares::new(args, raster.index(), common, &rates)?;
     let quarters = tile::quarters(&tiling.directions);
     let mut levels: BTreeMap<usize, Vec<Task>> = BTreeMap::new();

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use antumbra_image::atomic_write;
 use antumbra_load::MemorySize;
-use antumbra_raster::{Quantity, VrtTile, read_numbers, vrt_text};
+use antumbra_raster::{EXTENSIONS, Quantity, VrtTile, read_numbers, vrt_text};
 
 use super::{PLAN, Part, Plan, State};
 use crate::args::MergeArgs;
@@ -45,12 +45,33 @@ pub fn join(size: [usize; 2], parts: &[VrtTile], memory: MemorySize) -> Result<V
     Ok(values)
 }
 
+impl Plan {
+    /// Refuses outputs as which tiles cannot be joined.
+    pub fn check_outputs(&self, outputs: &[PathBuf]) -> Result<(), Failure> {
+        let (known, reason) = match self.head.bands.len() {
+            0 => return Ok(()),
+            1 => (
+                &EXTENSIONS[..],
+                "tiles are joined as a .tif, .asc, .npy or .vrt",
+            ),
+            _ => (
+                &["vrt"][..],
+                "tiles with several bands are joined as a .vrt, which names them",
+            ),
+        };
+        let mut outputs = outputs.iter();
+        let bad = outputs.find(|output| !is_one_of(output, known));
+        bad.map_or(Ok(()), |output| Err(Failure::name(output, reason)))
+    }
+}
+
 /// Joins the results of a plan. Returns the parts of a rendering or a bake, which their own command joins.
 pub fn merge(args: &MergeArgs, memory: MemorySize) -> Result<Option<Vec<PathBuf>>, Failure> {
     let [path] = &args.parts[..] else {
         return Err(Failure::usage("a plan is merged by itself"));
     };
     let plan = Plan::read(path, &[])?;
+    plan.check_outputs(&args.output)?;
     let (mut paths, mut tiles) = (Vec::new(), Vec::new());
     for task in &plan.tasks {
         interrupt::check()?;
@@ -93,15 +114,9 @@ pub fn merge(args: &MergeArgs, memory: MemorySize) -> Result<Option<Vec<PathBuf>
             let path = std::path::absolute(output).map_err(Failure::work)?;
             let text = vrt_text(&path, &grid, &bands, &tiles);
             atomic_write(output, |file| file.write_all(text.as_bytes()))?;
-        } else if bands.len() == 1 {
+        } else {
             let values = join(whole.size, &tiles, memory)?;
             bake::write_values(output, &grid, &values, &bands)?;
-        } else {
-            let reason = format!(
-                "tiles with {} bands are joined as a .vrt, which names them",
-                bands.len()
-            );
-            return Err(Failure::name(output, reason));
         }
         tell(format_args!(
             "joined {} tiles; wrote {}",

@@ -17,16 +17,17 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use antumbra_image::atomic_write;
 use serde::{Deserialize, Serialize};
 use xxhash_rust::xxh3::xxh3_64;
 
 use crate::exit::Failure;
 use crate::farm::is_built_in;
-use crate::input;
 use crate::output::text;
+use crate::{input, interrupt};
 
 pub use check::check;
-pub use make::make;
+pub use make::{make, parse, planned};
 pub use merge::{is_plan, merge};
 pub use run::run;
 pub use survey::survey;
@@ -41,7 +42,7 @@ pub struct Head {
     /// The scene or the index; relative to the folder of the plan if it is in it.
     scene: PathBuf,
     /// The command of all tasks, without its scene and its output.
-    command: Vec<String>,
+    pub command: Vec<String>,
     /// Folder of results and receipts, as `scene`.
     folder: PathBuf,
     /// Name and unit of each band of the tiles.
@@ -49,7 +50,7 @@ pub struct Head {
     /// Rows and columns of tiles, from north to south and from west to east: numbers of cells, as chunks of dask.
     chunks: [Vec<usize>; 2],
     /// Numbers of tasks that only need those before: so many first, so many next, and so on.
-    levels: Vec<usize>,
+    pub levels: Vec<usize>,
     bill: Bill,
 }
 
@@ -122,7 +123,7 @@ struct Receipt {
 /// A plan that was read.
 pub struct Plan {
     path: PathBuf,
-    head: Head,
+    pub head: Head,
     tasks: Vec<Task>,
     /// Tasks whose results these need.
     needed: HashMap<String, Task>,
@@ -144,7 +145,7 @@ enum State {
 
 impl Plan {
     /// Reads a plan; with names of tasks or their numbers only these, and the tasks that they need.
-    fn read(path: &Path, wanted: &[String]) -> Result<Self, Failure> {
+    pub fn read(path: &Path, wanted: &[String]) -> Result<Self, Failure> {
         let bad = |line: usize, reason: String| {
             Failure::Data(format!("{}:{}: {reason}", path.display(), line + 1))
         };
@@ -225,19 +226,53 @@ impl Plan {
         (receipt.schema == RECEIPT && receipt.task == id).then_some(receipt)
     }
 
-    /// The command line of all tasks, without an output.
-    fn command(&self) -> Vec<String> {
-        let (name, flags) = self
-            .head
-            .command
-            .split_first()
-            .map_or(("", &[][..]), |(name, flags)| (&**name, flags));
-        let scene = match is_built_in(&self.head.scene) {
+    /// Writes the plan.
+    pub fn write(&self) -> Result<(), Failure> {
+        let _writing = interrupt::writing();
+        Ok(atomic_write(&self.path, |file| {
+            serde_json::to_writer(&mut *file, &self.head)?;
+            for task in &self.tasks {
+                file.write_all(b"\n")?;
+                serde_json::to_writer(&mut *file, task)?;
+            }
+            file.write_all(b"\n")
+        })?)
+    }
+
+    /// The scene or the index, wherever this program runs.
+    pub fn scene(&self) -> PathBuf {
+        match is_built_in(&self.head.scene) {
             true => self.head.scene.clone(),
-            false => self.beside(&self.head.scene),
+            false => {
+                let path = self.beside(&self.head.scene);
+                std::path::absolute(&path).unwrap_or(path)
+            }
+        }
+    }
+
+    /// The command line of all tasks, without an output.
+    fn line(&self) -> Vec<String> {
+        line(&self.scene(), &self.head.command)
+    }
+
+    /// Whether another plan has the same tasks.
+    pub fn is_as(&self, other: &Self) -> Result<bool, Failure> {
+        let keys = |plan: &Self| -> Result<Vec<_>, _> {
+            plan.tasks.iter().map(|task| plan.key(task)).collect()
         };
-        let line = ["antumbra".to_owned(), name.to_owned(), text(&scene)];
-        line.into_iter().chain(flags.iter().cloned()).collect()
+        Ok(keys(self)? == keys(other)?)
+    }
+
+    /// Numbers of the tasks that are not done.
+    pub fn open(&self) -> Result<Vec<usize>, Failure> {
+        let mut open = Vec::new();
+        for (number, task) in self.tasks.iter().enumerate() {
+            interrupt::check()?;
+            if self.state(task, true)? != State::Done {
+                open.push(number);
+            }
+        }
+        Ok(open)
     }
 
     /// A number that changes with all that the result of a task is made of.
@@ -266,6 +301,15 @@ impl Plan {
             false => State::Disagreeing,
         })
     }
+}
+
+/// The command line of a scene, without an output.
+pub fn line(scene: &Path, command: &[String]) -> Vec<String> {
+    let (name, flags) = command
+        .split_first()
+        .map_or(("", &[][..]), |(name, flags)| (&**name, flags));
+    let line = ["antumbra".to_owned(), name.to_owned(), text(scene)];
+    line.into_iter().chain(flags.iter().cloned()).collect()
 }
 
 /// A file as a plan names it: relative to the folder of the plan if it is in it.

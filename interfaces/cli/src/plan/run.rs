@@ -2,6 +2,7 @@
 
 use std::cell::OnceCell;
 use std::collections::hash_map::RandomState;
+use std::ffi::OsString;
 use std::fs::{self, File};
 use std::hash::{BuildHasher, Hasher};
 use std::path::{Path, PathBuf};
@@ -140,7 +141,7 @@ impl Runner<'_> {
         match task.part {
             Part::Tile(tile) => self.tile(task, tile_of(tile), (&own, &scratch.0))?,
             Part::Sweep { tile, quarter } => self.sweep(task, tile_of(tile), (quarter, &own))?,
-            Part::Shard(shard) => self.shard(shard, &own)?,
+            Part::Shard(shard) => self.shard(shard, (&own, &scratch.0))?,
         }
         if let Some(raster) = self.raster.get() {
             for number in raster.used_files() {
@@ -198,7 +199,7 @@ impl Runner<'_> {
 
     fn bake(&self, work: &TileWork<'_>, output: &Path) -> Result<(), Failure> {
         let output = text(output);
-        let command = parse(self.plan.command(), &["-o", &output])?;
+        let command = parse(self.plan.line(), &["-o", &output])?;
         match &command {
             // What there is to say was said when the plan was made.
             Command::Bake(bake) => quietly(Loudness::Quiet, || {
@@ -262,14 +263,26 @@ impl Runner<'_> {
         self.bake(&work, Path::new("tile.tif"))
     }
 
-    fn shard(&self, [index, of]: [u32; 2], output: &Path) -> Result<(), Failure> {
+    fn shard(
+        &self,
+        [index, of]: [u32; 2],
+        (output, scratch): (&Path, &Path),
+    ) -> Result<(), Failure> {
         let (shard, output) = (format!("{index}/{of}"), text(output));
-        match parse(self.plan.command(), &["--shard", &shard, "-o", &output])? {
+        match parse(self.plan.line(), &["--shard", &shard, "-o", &output])? {
             Command::Render(mut args) => {
                 args.resume = true;
+                // The part has what errors are made of.
+                if let Some(path) = &mut args.stderr_image {
+                    *path = scratch.join("errors.exr");
+                }
                 render::run(&args, self.memory)
             }
-            Command::Bake(bake) => bake::run(bake.args().0, self.memory, None),
+            Command::Bake(bake) => {
+                let own = ["--shard", &shard, "-o", "share.part"].map(OsString::from);
+                let line = self.plan.line().into_iter().map(OsString::from);
+                bake::run_share(bake.args().0, self.memory, line.chain(own).collect())
+            }
             _ => Err(Failure::usage("a share is of a rendering or a bake")),
         }
     }

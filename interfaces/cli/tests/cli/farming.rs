@@ -27,25 +27,76 @@ const EVIL: [&str; 16] = [
     "~!& |é",
 ];
 
-/// A program that prints its arguments to a file.
-fn stub(place: &Place) -> String {
-    place.write("stub", "#!/bin/sh\nprintf '%s\\0' \"$@\" >args\n");
-    let executable = fs::Permissions::from_mode(0o755);
-    fs::set_permissions(place.path("stub"), executable).expect("permissions");
-    place.path("stub").to_str().expect("text").to_owned()
-}
+/// A folder with a `sbatch` that notes what it is given, for each job a file.
+struct Slurm(Place);
 
-/// The arguments that a script gives to the stub.
-fn arguments(place: &Place, script: &str) -> Vec<String> {
-    let _ = fs::remove_file(place.path("args"));
-    let bash = Command::new("bash")
-        .args(["-c", script])
-        .current_dir(place.path("."))
-        .env("SLURM_ARRAY_TASK_ID", "1")
-        .status();
-    assert!(bash.expect("bash").success(), "{script}");
-    let text = fs::read_to_string(place.path("args")).expect("arguments");
-    text.split_terminator('\0').map(str::to_owned).collect()
+impl Slurm {
+    fn new() -> Self {
+        let place = Place::with_room();
+        fs::create_dir(place.path("bin")).expect("a folder");
+        let note =
+            "cd \"$(dirname \"$0\")\"\nn=$(ls | wc -l)\nprintf '%s\\0' \"$@\" >job.$n\necho $n\n";
+        Self(place).program("bin/sbatch", note)
+    }
+
+    fn program(self, name: &str, script: &str) -> Self {
+        self.0.write(name, format!("#!/bin/sh\n{script}"));
+        let executable = fs::Permissions::from_mode(0o755);
+        fs::set_permissions(self.0.path(name), executable).expect("permissions");
+        self
+    }
+
+    /// Runs a program here as an element of an array; returns its code and what it says.
+    fn run(&self, program: &str, args: &[&str], element: &str) -> (Option<i32>, String) {
+        let path = std::env::var("PATH").expect("a path");
+        let bin = self.0.path("bin");
+        let run = Command::new(program)
+            .args(args)
+            .current_dir(self.0.path("."))
+            .env("PATH", format!("{}:{path}", bin.display()))
+            .env("SLURM_ARRAY_TASK_ID", element)
+            .output()
+            .expect("the program starts");
+        let said = String::from_utf8(run.stderr).expect("text");
+        (run.status.code(), said)
+    }
+
+    /// Submits jobs; returns what each one was given, and what was said.
+    fn submit(&self, args: &[&str]) -> (Vec<Vec<String>>, String) {
+        let before = self.jobs().len();
+        let farm = [&["farm", "slurm"], args].concat();
+        let (code, said) = self.run(env!("CARGO_BIN_EXE_antumbra"), &farm, "");
+        assert_eq!(code, Some(0), "{said}");
+        (self.jobs().split_off(before), said)
+    }
+
+    /// What all jobs so far were given.
+    fn jobs(&self) -> Vec<Vec<String>> {
+        let texts =
+            (1..).map_while(|job| fs::read_to_string(self.0.path(&format!("bin/job.{job}"))).ok());
+        let words = |text: String| text.split_terminator('\0').map(str::to_owned).collect();
+        texts.map(words).collect()
+    }
+
+    /// Runs an element of a job as Slurm does; returns its code and what it says.
+    fn element(&self, job: &[String], element: &str) -> (Option<i32>, String) {
+        let words = job.iter().skip_while(|word| word.starts_with("--"));
+        let words: Vec<&str> = words.map(String::as_str).collect();
+        self.run("bash", &words, element)
+    }
+
+    /// Runs all elements of a job but for a lost one.
+    fn all_but(&self, lost: &str, job: &[String]) {
+        let array = job.iter().find_map(|word| word.strip_prefix("--array="));
+        let elements = array
+            .unwrap_or("0")
+            .split(',')
+            .filter(|&element| element != lost);
+        for element in elements {
+            let (code, said) = self.element(job, element);
+            assert_eq!(code, Some(0), "{job:?}: {said}");
+        }
+    }
 }
 
 /// What Slurm makes of the log's name in a header.
@@ -63,73 +114,69 @@ fn log_of(script: &str) -> String {
 
 #[test]
 fn evil_names_arrive_whole_with_slurm() {
+    let spp = ["--spp", "4", "--resolution", "16x16"];
     for name in EVIL {
-        let place = Place::with_room();
-        let program = stub(&place);
-        let scene = format!("./{name}.pbrt");
-        fs::copy(place.path("room.pbrt"), place.path(&scene)).expect("a copy");
-        let folder = place.path(name);
-        fs::create_dir(&folder).expect("a folder");
-        let folder = folder.to_str().expect("text");
-        for part in ["0.part", "1.part"] {
-            fs::write(place.path(name).join(part), "").expect("a file");
-        }
-        let output = format!("./{name}.exr");
-        let args = [
-            "farm",
-            "slurm",
-            &scene,
-            "-o",
-            &output,
-            "--tasks",
-            "2",
-            "--dry-run",
-            "--program",
-            &program,
-            "--folder",
-            &format!("./{name}"),
-            "--stderr-image",
-            &format!("./{name}.e.exr"),
-        ];
-        let printed = place.run(&args).expect(0).stdout;
-        let scripts: Vec<_> = printed.split("#!/usr/bin/env bash").skip(1).collect();
-        let [render, merge] = scripts[..] else {
-            panic!("two scripts");
-        };
-        let (merge, _) = merge.split_once("\nsbatch ").expect("a command");
-        let path = |end: &str| {
+        let slurm = Slurm::new();
+        let place = &slurm.0;
+        let text = |end: &str| {
             place
                 .path(&format!("{name}{end}"))
                 .to_str()
                 .expect("text")
                 .to_owned()
         };
-        let found = arguments(&place, render);
-        assert_eq!(found[1], path(".pbrt"));
-        assert_eq!(found[3..6], ["--shard", "1/2", "-o"]);
-        assert_eq!(found[6], format!("{folder}/1.part"));
-        assert_eq!(found[8], format!("{folder}/1.stderr.exr"));
-        let found = arguments(&place, &cut(merge));
-        assert_eq!(
-            found[1..3],
-            [format!("{folder}/0.part"), format!("{folder}/1.part")]
-        );
-        assert_eq!(found[4], path(".exr"));
-        assert_eq!(found[6], path(".e.exr"));
-        let log = log_of(render);
-        if name.contains('\\') {
-            assert_eq!(log, "/dev/null");
-            assert!(place.path(name).join("render-1.log").is_file());
-        } else {
-            assert_eq!(log, format!("{folder}/render-1.log"));
+        let [scene, one, one_errors] =
+            [".pbrt", ".1.exr", ".1e.exr"].map(|end| format!("./{name}{end}"));
+        fs::copy(place.path("room.pbrt"), text(".pbrt")).expect("a copy");
+        let whole = ["render", &scene, "-o", &one, "--stderr-image", &one_errors];
+        place.run(&[&whole[..], &spp].concat()).expect(0);
+        let [image, errors, folder] = [".exr", ".e.exr", ""].map(|end| format!("./{name}{end}"));
+        let option = format!("--sbatch=--comment={name}");
+        let farm = [
+            &scene,
+            "-o",
+            &image,
+            "--stderr-image",
+            &errors,
+            "--folder",
+            &folder,
+            "--tasks",
+            "2",
+            &option,
+            "--",
+        ];
+        let (jobs, _) = slurm.submit(&[&farm[..], &spp].concat());
+        let script = |name: &str| format!("{}/{name}", text(""));
+        assert_eq!(jobs[0][2..], [&script("task.sh"), "0", "2", "1"]);
+        assert_eq!(jobs[1][2..], [script("merge.sh")]);
+        slurm.all_but("0", &jobs[0]);
+        // What is missing is submitted with the same options.
+        slurm.all_but("", &jobs[1]);
+        let again = slurm.jobs().split_off(2);
+        assert_eq!(again[0][1], "--array=0");
+        assert_eq!(again[0][2..], jobs[0][2..]);
+        assert_eq!(again[1][2..], jobs[1][2..]);
+        let head = fs::read_to_string(script("merge.sh")).expect("a script");
+        let mut options = head
+            .lines()
+            .filter_map(|line| line.strip_prefix("#SBATCH "));
+        let comment =
+            options.any(|line| shlex::split(line) == Some(vec![format!("--comment={name}")]));
+        assert!(comment, "{head}");
+        for job in &again {
+            slurm.all_but("", job);
+        }
+        for [found, wanted] in [[".exr", ".1.exr"], [".e.exr", ".1e.exr"]] {
+            let [found, wanted] = [found, wanted].map(|end| fs::read(text(end)).expect("an image"));
+            assert!(found == wanted, "{name}");
+        }
+        let log = log_of(&fs::read_to_string(script("task.sh")).expect("a script"));
+        match name.contains('\\') {
+            false => assert_eq!(log, script("task-1.log")),
+            true => assert!(log == "/dev/null" && place.path(name).join("task-1.log").is_file()),
         }
         assert!(!place.path("pwned").exists(), "{name}");
     }
-}
-
-/// A script without the heading of what follows it in a dry run.
-fn cut(script: &str) -> String {
-    script.trim_end().to_owned()
 }
 
 #[test]
@@ -181,73 +228,111 @@ fn options_of_sbatch_are_one_line() {
 
 #[test]
 fn a_job_given_again_submits_what_is_missing() {
-    let place = Place::with_room();
-    fs::create_dir(place.path("bin")).expect("a folder");
-    place.write("bin/sbatch", "#!/bin/sh\necho 7\n");
-    let executable = fs::Permissions::from_mode(0o755);
-    fs::set_permissions(place.path("bin/sbatch"), executable).expect("permissions");
-    let path = std::env::var("PATH").expect("a path");
-    let path = format!("{}:{path}", place.path("bin").display());
-    let submit = |tasks: &str| {
-        let run = Command::new(env!("CARGO_BIN_EXE_antumbra"))
-            .args([
-                "farm",
-                "slurm",
-                "room.pbrt",
-                "-o",
-                "a.exr",
-                "--tasks",
-                tasks,
-            ])
-            .current_dir(place.path("."))
-            .env("PATH", &path)
-            .output()
-            .expect("the program starts");
-        let told = String::from_utf8(run.stderr).expect("text");
-        (run.status.code(), told)
-    };
-    let (code, told) = submit("3");
-    assert!(code == Some(0) && told.contains("3 of 3 parts"), "{told}");
-    place.write("a.exr.farm/1.part", "");
-    let (code, told) = submit("3");
-    assert!(code == Some(0) && told.contains("2 of 3 parts"), "{told}");
-    let (code, told) = submit("4");
-    assert!(code == Some(2) && told.contains("another job"), "{told}");
+    let slurm = Slurm::new();
+    let farm = |tasks| ["room.pbrt", "-o", "a.exr", "--tasks", tasks];
+    let (jobs, said) = slurm.submit(&farm("3"));
+    assert!(said.contains("3 of 3 tasks"), "{said}");
+    slurm.all_but("0", &jobs[0]);
+    let (jobs, said) = slurm.submit(&farm("3"));
+    assert!(said.contains("1 of 3 tasks"), "{said}");
+    assert_eq!(jobs[0][1], "--array=0");
+    let plan = "a.exr.farm/plan.jsonl";
+    for (args, word) in [
+        (&["room.pbrt", "--tasks", "4"][..], "another job"),
+        (
+            &["room.pbrt", "--tasks", "3", "--", "--spp", "2"],
+            "another job",
+        ),
+        (
+            &["room.pbrt", "--tasks", "3", "--", "--stderr-image", "e.exr"],
+            "before --",
+        ),
+        (&["room.pbrt", "--lines", "l.csv"], "only visible"),
+        (&[plan, "--tasks", "3"], "leave out"),
+        (&[plan, "--", "--spp", "2"], "leave out"),
+        (
+            &[plan, "--stderr-image", "e.exr"],
+            "its command has this flag",
+        ),
+        (&["-"], "not the standard input"),
+    ] {
+        let args = [&["farm", "slurm", "-o", "a.exr"], args].concat();
+        let run = slurm.0.run(&args);
+        assert!(
+            run.code == 2 && run.stderr.contains(word),
+            "{args:?}: {}",
+            run.stderr
+        );
+    }
+    // All are done, and given as a plan only the last job is left.
+    slurm.all_but("", &jobs[0]);
+    let (jobs, _) = slurm.submit(&[plan, "-o", "b.exr"]);
+    assert_eq!(jobs.len(), 1);
+    slurm.all_but("", &jobs[0]);
+    assert!(slurm.0.path("b.exr").is_file());
 }
 
-/// Runs the jobs that `farm slurm --dry-run` prints, as three tasks in the folder `parts`, of which one is lost in the middle of its
-/// work.
-fn run_on_many(place: &Place, slurm: &[&str]) {
-    let printed = place.run(slurm).expect(0).stdout;
-    let scripts: Vec<_> = printed.split("#!/usr/bin/env bash").skip(1).collect();
-    let [compute, merge] = scripts[..] else {
-        panic!("two scripts: {printed}");
-    };
-    let (compute, _) = compute.rsplit_once("\n# ").expect("a comment");
-    let (merge, _) = merge.split_once("\nsbatch ").expect("a command");
-    fs::create_dir(place.path("parts")).expect("a folder");
-    let bash = |script: &str, task: &str| {
-        let bash = Command::new("bash")
-            .args(["-c", script])
-            .current_dir(place.path("."))
-            .env("SLURM_ARRAY_TASK_ID", task)
-            .status();
-        assert!(bash.expect("bash").success(), "{script}");
-    };
-    // The machine of a task was lost in the middle of its work.
-    bash(compute, "1");
-    let part = fs::read(place.path("parts/1.part")).expect("a part");
-    fs::remove_file(place.path("parts/1.part")).expect("a file");
-    place.write("parts/1.unfinished.part", &part[..part.len() / 2]);
-    for task in ["0", "1", "2"] {
-        bash(compute, task);
+#[test]
+fn a_last_job_gives_up_after_some_attempts() {
+    let slurm = Slurm::new();
+    let (mut jobs, _) = slurm.submit(&["room.pbrt", "-o", "a.exr", "--attempts", "3"]);
+    for attempt in 1..=3 {
+        let before = slurm.jobs().len();
+        assert_eq!(
+            slurm.element(&jobs[1], "0").0,
+            Some(i32::from(attempt == 3))
+        );
+        jobs = slurm.jobs().split_off(before);
+        assert_eq!(jobs.is_empty(), attempt == 3);
     }
-    bash(merge, "");
+}
+
+#[test]
+fn a_thousand_jobs_share_more_tasks() {
+    let slurm = Slurm::new().program("stub", "printf '%s ' \"$@\" >args\n");
+    let farm = [
+        "room.pbrt",
+        "-o",
+        "a.exr",
+        "--tasks",
+        "2500",
+        "--program",
+        "./stub",
+    ];
+    let (jobs, _) = slurm.submit(&farm);
+    let array: Vec<String> = (0..1000).map(|element| element.to_string()).collect();
+    assert_eq!(jobs[0][1], format!("--array={}", array.join(",")));
+    let plan = slurm.0.path("a.exr.farm/plan.jsonl");
+    for (element, tasks) in [
+        ("0", "0 1000 2000"),
+        ("499", "499 1499 2499"),
+        ("500", "500 1500"),
+    ] {
+        assert_eq!(slurm.element(&jobs[0], element).0, Some(0));
+        let found = fs::read_to_string(slurm.0.path("args")).expect("arguments");
+        assert_eq!(found, format!("run {} --task {tasks} ", plan.display()));
+    }
+}
+
+/// Runs what is submitted in the folder `parts`, as three tasks, of which one is lost in the middle of its work.
+fn run_on_many(slurm: &Slurm, farm: &[&str]) {
+    let (jobs, _) = slurm.submit(farm);
+    assert_eq!(slurm.element(&jobs[0], "1").0, Some(0));
+    let path = |name: &str| slurm.0.path("parts").join(name);
+    let part = fs::read(path("s00001.part")).expect("a part");
+    for name in ["s00001.part", "s00001.receipt.json"] {
+        fs::remove_file(path(name)).expect("a file");
+    }
+    fs::write(path("unfinished.s00001.part"), &part[..part.len() / 2]).expect("a file");
+    for job in &jobs {
+        slurm.all_but("", job);
+    }
 }
 
 #[test]
 fn openness_and_viewsheds_on_many_machines_have_the_same_bytes() {
-    let place = Place::with_room();
+    let slurm = Slurm::new();
+    let place = &slurm.0;
     let cells: Vec<String> = (0..160)
         .map(|row| {
             let heights = (0..200).map(|column| (row * 7 + column * column * 3) % 11);
@@ -268,7 +353,6 @@ fn openness_and_viewsheds_on_many_machines_have_the_same_bytes() {
         })
         .collect();
     place.write("eyes.csv", format!("x,y\n{eyes}"));
-    let program = env!("CARGO_BIN_EXE_antumbra");
     let visible = ["eyes.csv", "--viewshed", "--eye", "3", "--curvature"];
     let open = ["--samples", "512", "--two-sided"];
     for (scene, job, end, flags) in [
@@ -279,28 +363,44 @@ fn openness_and_viewsheds_on_many_machines_have_the_same_bytes() {
         place
             .run(&[&[job, scene], flags, &["-o", &one]].concat())
             .expect(0);
-        let farm = [
-            "farm",
-            "slurm",
-            scene,
-            "--command",
-            job,
-            "-o",
-            &all,
-            "--tasks",
-            "3",
-        ];
-        let more = ["--folder", "parts", "--program", program, "--dry-run", "--"];
-        run_on_many(&place, &[&farm[..], &more, flags].concat());
+        let farm = [scene, "--command", job, "-o", &all, "--tasks", "3"];
+        let more = ["--folder", "parts", "--"];
+        run_on_many(&slurm, &[&farm[..], &more, flags].concat());
         let [one, all] = [one, all].map(|name| fs::read(place.path(&name)).expect("a file"));
         assert!(one == all, "{job}");
         fs::remove_dir_all(place.path("parts")).expect("a folder");
+    }
+    // The last job writes lines of sight.
+    place.write(
+        "a.csv",
+        "x,y,z\n600100,5340100,30\n600900,5340100,9\n600100,5340900,30\n",
+    );
+    let pairs = ["visible", "dem.asc", "a.csv", "-o", "one.csv", "--lines"];
+    place.run(&[&pairs[..], &["lines.csv"]].concat()).expect(0);
+    let farm = [
+        "dem.asc",
+        "--command",
+        "visible",
+        "-o",
+        "all.csv",
+        "--lines",
+    ];
+    for job in slurm
+        .submit(&[&farm[..], &["all.lines.csv", "--", "a.csv"]].concat())
+        .0
+    {
+        slurm.all_but("", &job);
+    }
+    for [one, all] in [["one.csv", "all.csv"], ["lines.csv", "all.lines.csv"]] {
+        let [one, all] = [one, all].map(|name| fs::read(place.path(name)).expect("a table"));
+        assert!(one == all && !one.is_empty());
     }
 }
 
 #[test]
 fn a_bake_on_many_machines_has_the_same_bytes() {
-    let place = Place::with_room();
+    let slurm = Slurm::new();
+    let place = &slurm.0;
     let flags = [
         "--vertices",
         "--lat",
@@ -316,7 +416,6 @@ fn a_bake_on_many_machines_has_the_same_bytes() {
     let flags = [&flags[..], &day].concat();
     let scene = ["sun", "builtin:city:2000", "-o", "one.csv", "-o", "one.npz"];
     place.run(&[&scene[..], &flags].concat()).expect(0);
-    let program = env!("CARGO_BIN_EXE_antumbra");
     let farm = [
         "builtin:city:2000",
         "--command",
@@ -326,16 +425,8 @@ fn a_bake_on_many_machines_has_the_same_bytes() {
         "-o",
         "all.npz",
     ];
-    let tasks = ["--tasks", "3", "--folder", "parts", "--program", program];
-    let slurm = [
-        &["farm", "slurm"],
-        &farm[..],
-        &tasks,
-        &["--dry-run", "--"],
-        &flags,
-    ]
-    .concat();
-    run_on_many(&place, &slurm);
+    let tasks = ["--tasks", "3", "--folder", "parts"];
+    run_on_many(&slurm, &[&farm[..], &tasks, &["--"], &flags].concat());
     for end in ["csv", "npz"] {
         let [one, all] = ["one", "all"].map(|name| fs::read(place.path(&format!("{name}.{end}"))));
         assert_eq!(one.expect("a file"), all.expect("a file"), "{end}");
@@ -354,6 +445,94 @@ fn a_bake_on_many_machines_has_the_same_bytes() {
     ] {
         let run =
             place.run(&[&["farm", "slurm"], &farm[..], &["--dry-run"], &bad, &flags].concat());
+        assert!(run.code == 2 && run.stderr.contains(word), "{}", run.stderr);
+    }
+}
+
+#[test]
+fn a_plan_of_a_raster_is_submitted_level_by_level() {
+    let slurm = Slurm::new();
+    let place = &slurm.0;
+    let raster = |left: usize| {
+        let row = |row: usize| {
+            let heights =
+                (left..96).map(|column| ((row * 7 + column * column * 3) % 11).to_string());
+            heights.collect::<Vec<_>>().join(" ")
+        };
+        let cells: Vec<String> = (0..90).map(row).collect();
+        let (columns, corner) = (96 - left, 600_000 + left);
+        format!(
+            "ncols {columns}\nnrows 90\nxllcorner {corner}\nyllcorner 0\ncellsize 1\n{}\n",
+            cells.join("\n")
+        )
+    };
+    place.write("whole.asc", raster(0));
+    place.write("east.asc", raster(50));
+    let horizon = ["--cells", "--azimuths", "lattice:16", "--show", "sky-view"];
+    let whole = [&["horizon", "whole.asc", "-o", "whole.tif"], &horizon[..]].concat();
+    place.run(&whole).expect(0);
+    let index = ["index", "east.asc", "whole.asc", "-o", "all.index"];
+    place.run(&index).expect(0);
+    let plan = [
+        "plan",
+        "all.index",
+        "-o",
+        "all.jsonl",
+        "--tile",
+        "48",
+        "horizon",
+    ];
+    place.run(&[&plan, &horizon[..]].concat()).expect(0);
+    let (jobs, _) = slurm.submit(&["all.jsonl", "-o", "sky.tif"]);
+    assert_eq!(jobs.len(), 5);
+    for (number, job) in jobs.iter().enumerate() {
+        let before = format!("--dependency=afterany:{number}");
+        assert_eq!(job.contains(&before), number > 0, "{job:?}");
+    }
+    // A job of the first level is lost, so that others of each level fail.
+    slurm.all_but("1", &jobs[0]);
+    for job in &jobs[1..4] {
+        let array = job.iter().find_map(|word| word.strip_prefix("--array="));
+        let codes = array
+            .expect("an array")
+            .split(',')
+            .map(|element| slurm.element(job, element).0);
+        let failed = codes.filter(|&code| code != Some(0)).count();
+        assert!(failed > 0, "{job:?}");
+    }
+    slurm.all_but("", &jobs[4]);
+    let again = slurm.jobs().split_off(5);
+    assert!(again.len() == 5 && again[0][1] == "--array=1", "{again:?}");
+    for job in &again {
+        slurm.all_but("", job);
+    }
+    let [sky, whole] =
+        ["sky.tif", "whole.tif"].map(|name| fs::read(place.path(name)).expect("a raster"));
+    assert!(sky == whole);
+    // An index makes a plan, with tiles that are as large as all of it.
+    let farm = ["all.index", "--command", "horizon", "-o", "one.tif", "--"];
+    let farm = [&farm, &horizon[..]].concat();
+    for job in slurm.submit(&farm).0 {
+        slurm.all_but("", &job);
+    }
+    assert!(fs::read(place.path("one.tif")).expect("a raster") == whole);
+    assert_eq!(slurm.submit(&farm).0.len(), 1);
+    for (args, word) in [
+        (&["all.jsonl", "-o", "sky.png"][..], ".vrt"),
+        (
+            &[
+                "all.index",
+                "-o",
+                "b.tif",
+                "--tasks",
+                "2",
+                "--command",
+                "horizon",
+            ],
+            "--tile",
+        ),
+    ] {
+        let run = place.run(&[&["farm", "slurm"], args, &["--dry-run"]].concat());
         assert!(run.code == 2 && run.stderr.contains(word), "{}", run.stderr);
     }
 }

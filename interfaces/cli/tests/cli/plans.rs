@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 use std::path::Path;
+use std::process::Command;
 use std::{fs, thread};
 
 use antumbra_raster::{Crs, Grid, Quantity, read_numbers, write};
@@ -531,6 +532,34 @@ fn shares_of_other_scenes_are_plans_too() {
     place.run(&["merge", "city.jsonl", "-o", "b.png"]).expect(0);
     let [a, b] = ["a.png", "b.png"].map(|name| place.image(name));
     assert!(a == b, "the same picture");
+    // Parts of a bake are joined from any folder.
+    fs::create_dir(place.path("deep")).expect("a folder");
+    place.write(
+        "ground.obj",
+        "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 1 1 5\nf 1 2 3\nf 1 2 4\n",
+    );
+    let ao = ["ao", "ground.obj", "-o", "one.ply"];
+    place.run(&ao).expect(0);
+    let plan = [
+        "plan",
+        "ground.obj",
+        "-o",
+        "deep/ao.jsonl",
+        "--tasks",
+        "2",
+        "ao",
+    ];
+    place.run(&plan).expect(0);
+    place
+        .run(&["run", "deep/ao.jsonl", "--threads", "1"])
+        .expect(0);
+    let deep = Command::new(env!("CARGO_BIN_EXE_antumbra"))
+        .args(["merge", "ao.jsonl", "-o", "../all.ply"])
+        .current_dir(place.path("deep"))
+        .output();
+    assert!(deep.expect("the program starts").status.success());
+    let [one, all] = ["one.ply", "all.ply"].map(|name| fs::read(place.path(name)).expect("a mesh"));
+    assert!(one == all);
     // Another scene of the program is another plan, whatever folder plans are in.
     let head = [
         "plan",

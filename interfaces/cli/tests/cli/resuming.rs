@@ -405,9 +405,8 @@ fn a_farm_is_told_what_to_do() {
     for part in [
         "#SBATCH --partition=night\n",
         "#SBATCH --requeue",
-        "--shard \"$SLURM_ARRAY_TASK_ID\"/3",
-        "--spp 9",
-        "sbatch --parsable --array=0,1,2",
+        "sbatch --parsable --array=0,1,2 ",
+        "task.sh' 0 3 2\n",
         "--dependency=afterany",
     ] {
         assert!(run.stdout.contains(part), "{part} in\n{}", run.stdout);
