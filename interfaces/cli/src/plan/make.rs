@@ -26,14 +26,21 @@ pub fn planned(args: &PlanArgs, memory: MemorySize) -> Result<Plan, Failure> {
         let reason = "a plan names its scene: tasks need a file, not the standard input";
         return Err(Failure::usage(reason));
     }
-    let is_built_in = is_built_in(&args.scene);
+    let of_machine = |word: &&String| {
+        ["--max-memory", "--threads"].contains(&word.split('=').next().unwrap_or_default())
+    };
+    if let Some(flag) = args.command.iter().find(of_machine) {
+        return Err(Failure::Usage(format!(
+            "{flag}: machines differ, so `run` has this flag and a plan does not; with Slurm, --sbatch=--cpus-per-task=N and --sbatch=--mem=SIZE"
+        )));
+    }
     let folder = match &args.folder {
         Some(folder) => folder.clone(),
         None => beside(&args.output, ".results").ok_or_else(|| {
             Failure::name(&args.output, "a plan is a file, beside which results go")
         })?,
     };
-    let scene = match is_built_in {
+    let scene = match is_built_in(&args.scene) {
         true => args.scene.clone(),
         false => from(&args.output, &args.scene)?,
     };
@@ -124,7 +131,7 @@ pub fn make(args: &PlanArgs, memory: MemorySize) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The command of a plan, with an output and more.
+/// The command of a plan, with an output and more. Its flags say how tolerant readers of scenes are from then on.
 pub fn parse(line: Vec<String>, more: &[&str]) -> Result<Command, Failure> {
     let line = line
         .into_iter()
@@ -133,6 +140,9 @@ pub fn parse(line: Vec<String>, more: &[&str]) -> Result<Command, Failure> {
         let text = error.to_string();
         Failure::usage(text.strip_prefix("error: ").unwrap_or(&text))
     })?;
+    if cli.strict || cli.skip_unsupported {
+        scenes::set_tolerance(cli.strict, cli.skip_unsupported);
+    }
     cli.command
         .ok_or_else(|| Failure::usage("a plan needs a command"))
 }

@@ -244,6 +244,10 @@ fn a_job_given_again_submits_what_is_missing() {
             "another job",
         ),
         (
+            &["room.pbrt", "--tasks", "3", "--", "--threads", "2"],
+            "--sbatch=--cpus-per-task",
+        ),
+        (
             &["room.pbrt", "--tasks", "3", "--", "--stderr-image", "e.exr"],
             "before --",
         ),

@@ -622,6 +622,16 @@ fn shares_of_other_scenes_are_plans_too() {
         .run(&["plan", "-", "-o", "other.jsonl", "render"])
         .expect(2);
     assert!(plan.stderr.contains("standard input"), "{}", plan.stderr);
+    // How tolerant readers are goes with the plan, and what a machine may take does not.
+    let skipped = "Camera \"perspective\"\nWorldBegin\nShape \"hyperboloid\" \"point p1\" [-1 0 -1] \"point p2\" [1 0 1]\nWorldEnd\n";
+    place.write("skipped.pbrt", skipped);
+    let plan = ["plan", "skipped.pbrt", "-o", "skipped.jsonl", "render"];
+    place.run(&[&plan[..], &job].concat()).expect(65);
+    let tolerant = [&plan[..], &["--skip-unsupported"], &job].concat();
+    place.run(&tolerant).expect(0);
+    place.run(&["run", "skipped.jsonl"]).expect(0);
+    let limited = place.run(&[&plan[..], &["--max-memory=8G"]].concat());
+    assert!(limited.expect(2).stderr.contains("machines differ"));
     // Flags that would write a file of each task are refused, and so are commands without tasks.
     for (more, reason) in [
         (&["render", "--json", "a.json"][..], "--json"),
