@@ -80,7 +80,7 @@
 //!   points that points see, and the job of the latter;  `horizon_angles`, `view_factors`: one job each;  `bits`: matrices of one
 //!   bit per answer;  `directions`: directions over a hemisphere;  `curvature`: lines of sight over a round earth
 //! - `sun`: `position`: where the sun is;  `sky`, `perez`: the sky in patches, and its light;  `moment`, `clock`, `epw`: dates, time
-//!   zones, weather files;  `sunlight`: the job of a period;  `surroundings`: scenes in terrain;  `exposure`, `hourly`, `measures`: sums, steps and classes
+//!   zones, weather files;  `sunlight`: the job of a period;  `surroundings`: scenes in terrain;  `pieces`: scenes among files that are loaded when rays need them;  `exposure`, `hourly`, `measures`: sums, steps and classes
 //! - `rasters`: `viewshed`, `field_horizon`, `field_sun`: jobs of height rasters, which `antumbra-terrain` answers without rays;
 //! - `files`: `npz`: arrays for numpy;  `ply`, `glb`: meshes with a value at every vertex
 //! - `vector`, `orientation`: vectors, and where up and north are in a scene

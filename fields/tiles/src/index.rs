@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use antumbra_files::{open, write_file};
 use antumbra_terrain::{Monitor, Tile};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use crate::peaks::BLOCK;
@@ -71,6 +72,79 @@ struct Head<T> {
     index: T,
 }
 
+/// The kind of an index.
+#[derive(Deserialize)]
+struct Kind {
+    schema: String,
+}
+
+/// Reads an index with this schema, and its files. `check` gets the whole, a file, and the folder where names of files begin.
+pub(crate) fn read_lines<T: DeserializeOwned, F: DeserializeOwned>(
+    path: &Path,
+    schema: &str,
+    check: impl Fn(&T, &mut F, &Path) -> Result<(), &'static str>,
+) -> Result<(T, Vec<F>), Error> {
+    let mut text = String::new();
+    let read = open(path).and_then(|mut file| file.read_to_string(&mut text));
+    read.map_err(|error| Error::io(path, error))?;
+    let mut lines = text.lines().enumerate();
+    let bad =
+        |line: usize, reason: String| Error::broken(path, format!("line {}: {reason}", line + 1));
+    let (_, head) = lines.next().unwrap_or((0, ""));
+    let unread = |error| bad(0, format!("wanted an index of `antumbra index`: {error}"));
+    let Kind { schema: found } = serde_json::from_str(head).map_err(unread)?;
+    if found != schema {
+        return Err(bad(
+            0,
+            format!("found the schema `{found}`, wanted {schema}"),
+        ));
+    }
+    let head: Head<T> = serde_json::from_str(head).map_err(unread)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut files = Vec::new();
+    for (number, line) in lines {
+        let mut file =
+            serde_json::from_str(line).map_err(|error| bad(number, error.to_string()))?;
+        check(&head.index, &mut file, folder).map_err(|reason| bad(number, reason.into()))?;
+        files.push(file);
+    }
+    match files.len() == head.files {
+        true => Ok((head.index, files)),
+        false => {
+            let (found, wanted) = (files.len(), head.files);
+            let reason = format!("found {found} files, wanted {wanted}; it is cut short");
+            Err(Error::broken(path, reason))
+        }
+    }
+}
+
+/// Writes an index, with names of files that are relative to its folder if they are in it: `named` gives a file another name.
+pub(crate) fn write_lines<T: Serialize, F: Serialize>(
+    path: &Path,
+    (schema, index): (&str, &T),
+    (files, path_of): (&[F], fn(&F) -> &PathBuf),
+    named: impl Fn(&F, &Path) -> F,
+) -> Result<(), Error> {
+    let text = |error: serde_json::Error| Error::broken(path, error.to_string());
+    let head = Head {
+        schema: schema.to_owned(),
+        files: files.len(),
+        index,
+    };
+    let mut lines = serde_json::to_string(&head).map_err(text)?;
+    let whole = std::path::absolute(path).map_err(|error| Error::io(path, error))?;
+    let folder = whole.parent().unwrap_or(Path::new(""));
+    for file in files {
+        let name = path_of(file);
+        let file = named(file, name.strip_prefix(folder).unwrap_or(name));
+        lines.push('\n');
+        lines.push_str(&serde_json::to_string(&file).map_err(text)?);
+    }
+    lines.push('\n');
+    write_file(path, |file| file.write_all(lines.as_bytes()))
+        .map_err(|error| Error::io(path, error))
+}
+
 impl Index {
     /// Makes the index of files, and writes it with its file of peaks, `path.peaks`. All cells are read once. Where several files have
     /// data in a cell, the first one has the cell.
@@ -89,75 +163,38 @@ impl Index {
     /// # Errors
     /// There is no such file, or it is no index.
     pub fn read(path: &Path) -> Result<Self, Error> {
-        let mut text = String::new();
-        let read = open(path).and_then(|mut file| file.read_to_string(&mut text));
-        read.map_err(|error| Error::io(path, error))?;
-        let mut lines = text.lines().enumerate();
-        let bad = |line: usize, reason: String| {
-            Error::broken(path, format!("line {}: {reason}", line + 1))
-        };
-        let (_, head) = lines.next().unwrap_or((0, ""));
-        let head: Head<Self> = serde_json::from_str(head)
-            .map_err(|error| bad(0, format!("wanted an index of `antumbra index`: {error}")))?;
-        if head.schema != SCHEMA {
-            return Err(bad(
-                0,
-                format!("found the schema `{}`, wanted {SCHEMA}", head.schema),
-            ));
-        }
-        let mut index = head.index;
-        let folder = path.parent().unwrap_or(Path::new(""));
-        for (number, line) in lines {
-            let file: Listed =
-                serde_json::from_str(line).map_err(|error| bad(number, error.to_string()))?;
+        let check = |index: &Self, file: &mut Listed, folder: &Path| {
             let [across, down] = file.size.map(|cells| cells.div_ceil(BLOCK));
             let whole = [index.columns, index.rows];
             let is_in = [0, 1].iter().all(|&axis| {
                 let end = file.at[axis].checked_add(file.size[axis]);
                 file.size[axis] > 0 && end.is_some_and(|end| end <= whole[axis])
             });
-            let wanted = across.checked_mul(down);
-            if !is_in || wanted != Some(file.peaks.len()) {
-                let reason =
-                    "wanted a file inside of the whole, and a peak for each square of 512 cells";
-                return Err(bad(number, reason.into()));
+            file.path = folder.join(&file.path);
+            match is_in && across.checked_mul(down) == Some(file.peaks.len()) {
+                true => Ok(()),
+                false => Err(
+                    "wanted a file inside of the whole, and a peak for each square of 512 cells",
+                ),
             }
-            let path = folder.join(&file.path);
-            index.files.push(Listed { path, ..file });
-        }
-        if index.files.len() != head.files {
-            let (found, wanted) = (index.files.len(), head.files);
-            return Err(Error::broken(
-                path,
-                format!("found {found} files, wanted {wanted}; it is cut short"),
-            ));
-        }
+        };
+        let (mut index, files) = read_lines(path, SCHEMA, check)?;
+        index.files = files;
         Ok(index)
     }
 
     /// Writes the text.
     fn write(&self, path: &Path) -> Result<(), Error> {
-        let text = |error: serde_json::Error| Error::broken(path, error.to_string());
-        let head = Head {
-            schema: SCHEMA.to_owned(),
-            files: self.files.len(),
-            index: self,
+        let named = |file: &Listed, name: &Path| Listed {
+            path: name.to_path_buf(),
+            ..file.clone()
         };
-        let mut lines = serde_json::to_string(&head).map_err(text)?;
-        let whole = std::path::absolute(path).map_err(|error| Error::io(path, error))?;
-        let folder = whole.parent().unwrap_or(Path::new(""));
-        for file in &self.files {
-            let name = file.path.strip_prefix(folder).unwrap_or(&file.path);
-            let file = Listed {
-                path: name.to_path_buf(),
-                ..file.clone()
-            };
-            lines.push('\n');
-            lines.push_str(&serde_json::to_string(&file).map_err(text)?);
-        }
-        lines.push('\n');
-        write_file(path, |file| file.write_all(lines.as_bytes()))
-            .map_err(|error| Error::io(path, error))
+        write_lines(
+            path,
+            (SCHEMA, self),
+            (&self.files, |file| &file.path),
+            named,
+        )
     }
 
     /// All cells.
@@ -211,7 +248,7 @@ impl Listed {
 }
 
 /// Checksums as text.
-mod hex {
+pub(crate) mod hex {
     use serde::{Deserialize, Deserializer, Serializer, de::Error};
 
     pub fn serialize<S: Serializer>(number: &u64, serializer: S) -> Result<S::Ok, S::Error> {

@@ -1,7 +1,7 @@
-//! Height rasters of many files that are larger than memory.
+//! Height rasters, and scenes, of many files that are larger than memory.
 //!
 //! An [`Index`] says which files a raster has, where their cells are, and how high the surface is at most in each square of 512 cells.
-//! An [`Indexed`] raster reads parts of it, and gives tiles to [`Pull`](antumbra_terrain::Pull).
+//! An [`Indexed`] raster reads parts of it, and gives tiles to [`Pull`](antumbra_terrain::Pull). A [`City`] is the index of mesh files.
 //!
 //! ```
 //! use antumbra_raster::{Grid, Quantity, write};
@@ -30,10 +30,11 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! - `index`: the index and its text;  `survey`: how it is made;  `peaks`: the file beside it
+//! - `index`: the index and its text;  `survey`: how it is made;  `peaks`: the file beside it;  `city`: the index of mesh files
 //! - `indexed`: a raster that an index describes;  `store`: parts of its files
 #![forbid(unsafe_code)]
 
+mod city;
 mod index;
 mod indexed;
 mod peaks;
@@ -43,6 +44,7 @@ mod survey;
 use std::io;
 use std::path::{Path, PathBuf};
 
+pub use city::{Box3, City, Piece, boxes_around};
 pub use index::{Index, Listed};
 pub use indexed::Indexed;
 pub use store::checksum;

@@ -75,7 +75,7 @@ fn run(cli: Cli) -> Result<ExitCode, Failure> {
         Some(Command::View(args)) => view::run(&args, memory),
         Some(Command::Merge(args)) => merge::run(&args, memory),
         Some(Command::Farm(command)) => farm::run(&command, memory),
-        Some(Command::Index(args)) => plan::survey(&args),
+        Some(Command::Index(args)) => plan::survey(&args, memory),
         Some(Command::Plan(args)) => plan::make(&args, memory),
         Some(Command::Run(args)) => plan::run(&args, memory),
         Some(Command::Check(args)) => plan::check(&args),

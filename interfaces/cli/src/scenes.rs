@@ -17,6 +17,7 @@ use antumbra_raster::{Crs, Grid, unit_name};
 use antumbra_render::{Camera, World};
 use antumbra_scene::{Image, Pixels, Projection, Sampler, Scene};
 use antumbra_trees::ORDERS;
+use glam::DVec3;
 
 use crate::args::{CameraArgs, PictureArgs, PoseArgs};
 use crate::exit::{self, Failure, say, tell};
@@ -42,8 +43,9 @@ pub fn set_tolerance(strict: bool, skip_unsupported: bool) {
 }
 
 /// Options of readers, with the tolerance that was set.
-fn options(max_memory: MemorySize, looks: bool) -> Options {
+fn options(max_memory: MemorySize, looks: bool, origin: Option<DVec3>) -> Options {
     Options {
+        origin,
         max_memory,
         looks,
         strict: STRICT.load(Ordering::Relaxed),
@@ -54,23 +56,38 @@ fn options(max_memory: MemorySize, looks: bool) -> Options {
 
 /// Reads or generates a scene for a job that uses no materials, and prints the reader's warnings and notes.
 pub fn load(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
-    load_one(&[name.to_path_buf()], max_memory)
+    load_one(&[name.to_path_buf()], max_memory, None)
 }
 
-/// As [`load`], perhaps of several height rasters that are one scene.
-pub fn load_one(names: &[PathBuf], max_memory: MemorySize) -> Result<Loaded, Failure> {
-    read(names, max_memory, false)
+/// As [`load`], perhaps of several height rasters that are one scene, perhaps with positions that are measured from here.
+pub fn load_one(
+    names: &[PathBuf],
+    max_memory: MemorySize,
+    origin: Option<DVec3>,
+) -> Result<Loaded, Failure> {
+    read(names, max_memory, (false, origin))
+}
+
+/// As [`load`], with positions that are measured from here, and without a word.
+pub fn load_from(name: &Path, origin: DVec3, max_memory: MemorySize) -> Result<Loaded, Failure> {
+    interrupt::check()?;
+    let options = options(max_memory, false, Some(origin));
+    Ok(antumbra_load::load(name, &options)?)
 }
 
 /// Reads or generates a scene with its materials, and prints the reader's warnings and notes.
 pub fn load_with_looks(name: &Path, max_memory: MemorySize) -> Result<Loaded, Failure> {
-    read(&[name.to_path_buf()], max_memory, true)
+    read(&[name.to_path_buf()], max_memory, (true, None))
 }
 
-fn read(names: &[PathBuf], max_memory: MemorySize, looks: bool) -> Result<Loaded, Failure> {
+fn read(
+    names: &[PathBuf],
+    max_memory: MemorySize,
+    (looks, origin): (bool, Option<DVec3>),
+) -> Result<Loaded, Failure> {
     let name = &names[0];
     let reading = progress::doing(&name.to_string_lossy(), "reading");
-    let options = options(max_memory, looks);
+    let options = options(max_memory, looks, origin);
     let loaded = match name == Path::new(STDIN) {
         true => antumbra_load::load_text(standard_input(max_memory)?, &options),
         false => antumbra_load::load_all(names, &options),
@@ -145,7 +162,7 @@ pub fn tell_warnings(warnings: &[Warning]) -> Result<(), Failure> {
 /// Reads height rasters as one without making a mesh of it, and prints the reader's warnings.
 pub fn load_heights(names: &[PathBuf], max_memory: MemorySize) -> Result<Heights, Failure> {
     let reading = progress::doing(&names[0].to_string_lossy(), "reading");
-    let heights = antumbra_load::load_heights(names, &options(max_memory, false));
+    let heights = antumbra_load::load_heights(names, &options(max_memory, false, None));
     drop(reading);
     interrupt::check()?;
     let heights = heights?;

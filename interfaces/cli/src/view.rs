@@ -8,6 +8,7 @@ use antumbra_scene::Scene;
 use antumbra_view::{Server, Sun, SunDay};
 
 use crate::args::ViewArgs;
+use crate::bake::ground::extent;
 use crate::bake::map;
 use crate::bake::site::Asked;
 use crate::exit::{Failure, print, tell};
@@ -80,7 +81,7 @@ fn sun_day(args: &ViewArgs, date: &Moment, loaded: &Loaded) -> Result<SunDay, Fa
         units: None,
         north: Some(&args.north),
     };
-    asked.of(loaded, up)?;
+    asked.of((loaded, extent(&loaded.scene)), up)?;
     // Both are required beside the date.
     let [latitude, longitude] = [args.lat, args.lon].map(Option::unwrap_or_default);
     let place = Place {

@@ -38,6 +38,9 @@ pub struct Options {
     pub skip_unsupported: bool,
     /// Names of child orders that a `.pbrt` file may request.
     pub orders: Vec<&'static str>,
+    /// Where positions of files are measured from, such as one place for all files of a city. If absent: a place near each scene that
+    /// lies far from zero, or zero.
+    pub origin: Option<DVec3>,
 }
 
 impl Default for Options {
@@ -49,6 +52,7 @@ impl Default for Options {
             looks: true,
             skip_unsupported: false,
             orders: Order::ALL.map(Order::name).to_vec(),
+            origin: None,
         }
     }
 }
@@ -126,14 +130,16 @@ pub fn load_all(names: &[PathBuf], options: &Options) -> Result<Loaded, Error> {
     let start = Instant::now();
     let name = names.first().map_or(Path::new(""), PathBuf::as_path);
     let mut loaded = match name.to_str().and_then(|name| name.strip_prefix(BUILTIN)) {
-        _ if names.len() > 1 => from_origin(|origin| mesh((name, names), options, origin))?,
+        _ if names.len() > 1 => {
+            from_origin(options, |origin| mesh((name, names), options, origin))?
+        }
         Some(name) => Loaded::plain(built_in(name)?),
-        None if extension(name) == "pbrt" => from_origin(|origin| {
+        None if extension(name) == "pbrt" => from_origin(options, |origin| {
             let mut loaded = antumbra_pbrt::load(name, &pbrt_options(options, origin))?;
             loaded.scene.name = stem(name);
             Ok(of_pbrt(loaded))
         })?,
-        None => from_origin(|origin| mesh((name, names), options, origin))?,
+        None => from_origin(options, |origin| mesh((name, names), options, origin))?,
     };
     if options.strict && !loaded.warnings.is_empty() {
         return Err(Error::Strict(loaded.warnings));
@@ -157,9 +163,13 @@ pub fn load_all(names: &[PathBuf], options: &Options) -> Result<Loaded, Error> {
 
 /// Reads a scene as it is, and once more if it lies far away: then its positions are measured from an origin of its own
 /// before they are rounded.
-fn from_origin(read: impl Fn(DVec3) -> Result<Loaded, Error>) -> Result<Loaded, Error> {
-    let loaded = read(DVec3::ZERO)?;
-    let origin = Extent::of(&loaded.scene).map_or(DVec3::ZERO, |extent| extent.local_origin());
+fn from_origin(
+    options: &Options,
+    read: impl Fn(DVec3) -> Result<Loaded, Error>,
+) -> Result<Loaded, Error> {
+    let loaded = read(options.origin.unwrap_or_default())?;
+    let extent = Extent::of(&loaded.scene).filter(|_| options.origin.is_none());
+    let origin = extent.map_or(DVec3::ZERO, |extent| extent.local_origin());
     if origin == DVec3::ZERO {
         return Ok(loaded);
     }
@@ -175,7 +185,7 @@ fn from_origin(read: impl Fn(DVec3) -> Result<Loaded, Error>) -> Result<Loaded, 
 pub fn load_text(text: Vec<u8>, options: &Options) -> Result<Loaded, Error> {
     let start = Instant::now();
     let name = Path::new("stdin");
-    let mut loaded = from_origin(|origin| {
+    let mut loaded = from_origin(options, |origin| {
         let options = pbrt_options(options, origin);
         Ok(of_pbrt(antumbra_pbrt::parse(text.clone(), name, &options)?))
     })?;

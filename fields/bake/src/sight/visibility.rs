@@ -133,22 +133,7 @@ impl<'a> DirectionRows<'a> {
 
     /// The normal of length 1 of a point, 0 for points in free space; `None` if point or normal have no value.
     fn facing(&self, row: usize) -> Option<[f64; 3]> {
-        let is_finite = self.places.points[row].iter().all(|x| x.is_finite());
-        let normal = match self.places.normals.get(row) {
-            None => Some([0.0; 3]),
-            Some(normal) => unit(normal.map(f64::from)),
-        };
-        normal.filter(|_| is_finite)
-    }
-
-    /// Where the rays of a point begin: an origin, and a distance from there.
-    fn origin(&self, row: usize) -> ([f32; 3], f32) {
-        let point = self.places.points[row];
-        match self.facing(row) {
-            None => ([f32::NAN; 3], 0.0),
-            Some(_) if self.places.normals.is_empty() => (point, self.bvh.origin_offset(point)),
-            Some(normal) => (above(self.bvh, &point, normal), 0.0),
-        }
+        facing(self.places.points[row], self.places.normals.get(row))
     }
 
     /// Fills `values`, so many for each row, with what `finish` makes of the row and its bits, and puts them where the points
@@ -176,8 +161,13 @@ impl<'a> DirectionRows<'a> {
                     return Err(Error::Cancelled);
                 }
                 let rows = first..first + values.len() / width;
-                let (origins, near): (Vec<_>, Vec<_>) =
-                    rows.clone().map(|row| self.origin(row)).unzip();
+                let Places {
+                    points, normals, ..
+                } = &self.places;
+                let origins = rows
+                    .clone()
+                    .map(|row| origin(self.bvh, points[row], normals.get(row)));
+                let (origins, near): (Vec<_>, Vec<_>) = origins.unzip();
                 let mut open = vec![0; rows.len() * per_row];
                 let group = self.bvh.group(&origins, &self.directions).on_this_thread();
                 let group = match &self.places.normals[..] {
@@ -201,9 +191,28 @@ impl<'a> DirectionRows<'a> {
     }
 }
 
+/// The normal of length 1 of a point, 0 for points in free space; `None` if point or normal have no value.
+fn facing(point: [f32; 3], normal: Option<&[f32; 3]>) -> Option<[f64; 3]> {
+    let is_finite = point.iter().all(|x| x.is_finite());
+    let normal = match normal {
+        None => Some([0.0; 3]),
+        Some(normal) => unit(normal.map(f64::from)),
+    };
+    normal.filter(|_| is_finite)
+}
+
+/// Where the rays of a point begin: an origin, and a distance from there.
+pub(crate) fn origin(bvh: &Bvh, point: [f32; 3], normal: Option<&[f32; 3]>) -> ([f32; 3], f32) {
+    match (facing(point, normal), normal) {
+        (None, _) => ([f32::NAN; 3], 0.0),
+        (Some(_), None) => (point, bvh.origin_offset(point)),
+        (Some(facing), Some(_)) => (above(bvh, &point, facing), 0.0),
+    }
+}
+
 /// A direction as rays take it: of length 1 if lengths count or if it is so long or short that the kernel takes it for none; 0
 /// for a direction that nothing sees.
-fn ray_direction(dir: [f32; 3], has_lengths: bool) -> [f32; 3] {
+pub(crate) fn ray_direction(dir: [f32; 3], has_lengths: bool) -> [f32; 3] {
     let Some(unit) = unit(dir.map(f64::from)) else {
         return [0.0; 3];
     };

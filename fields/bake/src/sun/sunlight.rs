@@ -11,9 +11,9 @@ use crate::memory;
 use crate::points::curve::Places;
 use crate::vector::dot;
 use crate::{
-    Answers, BitMatrix, Clock, Error, Irradiance, Job, Key, Moment, Monitor, Orientation, Place,
-    Refraction, Size, SkyPatches, SunPosition, Surroundings, Weather, Weighting, ones, perez_sky,
-    sees_directions, sun_positions,
+    Answers, BitMatrix, Clock, Error, Irradiance, Job, Key, Moment, Monitor, Orientation, Pieces,
+    Place, Refraction, Size, SkyPatches, SunPosition, Surroundings, Weather, Weighting, ones,
+    perez_sky, sees_directions, sun_positions,
 };
 
 /// Most steps of time.
@@ -539,6 +539,7 @@ pub struct SunJob<'a> {
     directions: Vec<[f32; 3]>,
     /// Terrain, and the same lights seen from there.
     terrain: Option<(&'a Surroundings<'a>, Vec<Light>)>,
+    pieces: Option<&'a Pieces<'a>>,
 }
 
 /// Result of a [`SunJob`].
@@ -567,6 +568,7 @@ impl<'a> SunJob<'a> {
             sunlight,
             directions: [sunlight.sun_directions(), sunlight.patch_directions()].concat(),
             terrain: None,
+            pieces: None,
         })
     }
 
@@ -578,6 +580,12 @@ impl<'a> SunJob<'a> {
         let lights = terrain.lights(&self.sunlight.on_map(terrain.north()))?;
         self.terrain = Some((terrain, lights));
         Ok(self)
+    }
+
+    /// The job of these sensors beside pieces of a larger scene, which hide lights as the scene does.
+    pub fn beside(mut self, pieces: &'a Pieces<'a>) -> Self {
+        self.pieces = Some(pieces);
+        self
     }
 
     /// Number of rays: one to each sun and patch above the plane of each sensor.
@@ -616,6 +624,9 @@ impl Job for SunJob<'_> {
         if let Some((terrain, _)) = &self.terrain {
             terrain.identify(key);
         }
+        if let Some(pieces) = self.pieces {
+            pieces.identify(key);
+        }
     }
 
     fn answers(&self, bvh: &Bvh, items: Range<usize>, monitor: &dyn Monitor) -> Answers<Self> {
@@ -624,6 +635,10 @@ impl Job for SunJob<'_> {
         let mut words = seen.into_words();
         if let Some((terrain, lights)) = &self.terrain {
             terrain.hide((bvh, points), lights, &mut words, monitor)?;
+        }
+        if let Some(pieces) = self.pieces {
+            let scene = (bvh, points, normals);
+            pieces.hide(scene, &self.directions, &mut words, monitor)?;
         }
         Ok(words)
     }

@@ -10,14 +10,15 @@ use crate::json::Destination;
 /// Flags of `index`.
 #[derive(Debug, Args)]
 pub struct IndexArgs {
-    /// Height rasters that are one, or folders of them
+    /// Height rasters that are one, or meshes of a city
     ///
-    /// .tif, .asc, or .npy with a .wld, whose cells fall on each other. Where several have data in a cell, the first one has it.
-    #[arg(required = true, value_name = "RASTER")]
-    pub rasters: Vec<PathBuf>,
+    /// .tif, .asc, or .npy with a .wld, or folders of them, whose cells fall on each other: where several have data in a cell, the first one
+    /// has it. Or .ply, .obj, .stl, .gltf or .glb in the same coordinates.
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
     /// Index to write, such as country.index
     ///
-    /// Text with a JSON object in each line. Beside it is written FILE.peaks, by which tiles find what of other files matters.
+    /// Text with a JSON object in each line. With an index of rasters FILE.peaks is written, by which tiles find what of other files matters.
     #[arg(short, long, value_name = "FILE", required = true, help_heading = heading::OUTPUT)]
     pub output: PathBuf,
     #[command(flatten)]

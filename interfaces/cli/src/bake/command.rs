@@ -12,6 +12,7 @@ use antumbra_tiles::Indexed;
 use serde::{Serialize, Serializer};
 
 use super::chunks::{self, PartFile};
+use super::city::Store;
 use super::ground::Ground;
 use super::map;
 use super::neighbours::tell_neighbours;
@@ -43,6 +44,11 @@ pub trait Baking: Shared {
         Err(Failure::usage(
             "tiles of an index are for horizon and sun with --cells",
         ))
+    }
+
+    /// Refuses flags with which files of a city cannot be tasks of a plan.
+    fn check_city(&self) -> Result<(), Failure> {
+        Err(Failure::usage("files of a city are for sun"))
     }
 
     /// Files that are written beside `--output` and `--json`, and files that are read beside the scene.
@@ -273,7 +279,15 @@ impl Bake<'_> {
     /// Starts the threads, reads the scene and builds its tree, [bent](Ground::load) if flags say so.
     pub fn ground(&self, files: &mut Files, bent: Option<&VisibleArgs>) -> Result<Ground, Failure> {
         self.start_threads()?;
-        Ground::load(self.scene, self.isa, self.memory, files, bent)
+        Ground::load(self.scene, (self.isa, self.memory), files, (bent, None))
+    }
+
+    /// As [`ground`](Self::ground), perhaps in the city of an index.
+    pub fn ground_in(&self, files: &mut Files, city: Option<&Path>) -> Result<Ground, Failure> {
+        self.start_threads()?;
+        let city = city.map(|index| Store::open(index, self.memory));
+        let city = city.transpose()?;
+        Ground::load(self.scene, (self.isa, self.memory), files, (None, city))
     }
 
     /// Starts the threads and reads a height raster, for a job without a mesh and without a tree.

@@ -16,6 +16,7 @@ use antumbra_raster::Crs;
 use antumbra_render::World;
 use antumbra_scene::{Geometry, Scene, Shape, TriangleMesh};
 
+use super::city::{Around, Beside, Objects, Store};
 use super::parts::Parts;
 use super::visible::VisibleArgs;
 use crate::exit::{Failure, say, tell};
@@ -29,6 +30,10 @@ pub struct Ground {
     pub bvh: Bvh,
     /// All meshes as one, measured from `local`.
     pub mesh: Mesh,
+    /// What touches the scene, of a city that it is in.
+    beside: Option<Beside>,
+    /// `mesh`, turned, and then what touches it, if anything does.
+    whole: Option<Mesh>,
     /// Names of the triangles of `mesh`.
     pub parts: Parts,
     /// Kinds of its triangles, once these have been [turned](Ground::face).
@@ -37,32 +42,45 @@ pub struct Ground {
     pub local: LocalOrigin,
     /// How the scene is bent, if it is.
     pub curvature: Option<Curvature>,
+    /// The city that the scene is in.
+    pub around: Option<Around>,
     pub build_seconds: f64,
 }
 
 impl Ground {
-    /// Reads a scene and builds its tree. Flags of `visible` with `--curvature` bend it.
+    /// Reads a scene and builds its tree, perhaps in the city of an index. Flags of `visible` with `--curvature` bend it.
     pub fn load(
         names: &[PathBuf],
-        isa: Isa,
-        memory: MemorySize,
+        (isa, memory): (Isa, MemorySize),
         files: &mut Files,
-        bent: Option<&VisibleArgs>,
+        (bent, city): (Option<&VisibleArgs>, Option<Arc<Store>>),
     ) -> Result<Self, Failure> {
-        let mut loaded = scenes::load_one(names, memory)?;
+        let origin = city.as_ref().map(|store| store.city.origin.into());
+        let mut loaded = scenes::load_one(names, memory, origin)?;
         files.reads_all(&loaded.inputs)?;
         let flat = loaded.scene.flattened();
         let flat = flat.map_err(|error| Failure::scene(&loaded.scene.name, error))?;
         loaded.scene = flat.into_owned();
         let curvature = bent.map(|args| bend(args, &mut loaded)).transpose()?;
         let (mesh, _) = mesh(&loaded.scene, false)?;
-        let parts = Parts::new(&loaded.scene, &loaded.names);
+        let mut parts = Parts::new(&loaded.scene, &loaded.names);
         let local = LocalOrigin {
             origin: loaded.scene.origin.into(),
         };
+        let around = city.map(|store| Around::new(store, (&names[0], &mesh)));
+        let (around, beside) = around.transpose()?.unzip();
+        if let Some(Beside { objects, .. }) = &beside {
+            parts.push_unnamed(objects.numbers.len());
+        }
         interrupt::check()?;
         let start = Instant::now();
+        let own = loaded.scene.shapes.len();
+        loaded
+            .scene
+            .shapes
+            .extend(beside.as_ref().map(Beside::shape));
         let world = scenes::world(&loaded.scene, Builder::default())?;
+        loaded.scene.shapes.truncate(own);
         let bvh = world.bvh(Engine::of(isa));
         Ok(Self {
             loaded,
@@ -72,9 +90,20 @@ impl Ground {
             parts,
             surfaces: None,
             local,
+            beside,
+            whole: None,
             curvature,
+            around,
             build_seconds: start.elapsed().as_secs_f64(),
         })
+    }
+
+    /// The box of the scene in the world, or of the city that it is in.
+    pub fn extent(&self) -> Option<Extent> {
+        match &self.around {
+            Some(around) => around.extent(),
+            None => extent(&self.loaded.scene),
+        }
     }
 
     /// Splits the vertices of meshes without normals at creases, so that each wall at a corner has its own normal. Says how
@@ -94,10 +123,21 @@ impl Ground {
 
     /// Turns surfaces to the side that people mean, and says how many.
     pub fn face(&mut self, plan: &Orientation) {
-        let objects = self.parts.objects(&self.mesh).numbers();
+        let own = [self.mesh.positions.len(), self.mesh.indices.len()];
+        let numbers = self.parts.objects(&self.mesh).numbers();
+        let mesh = std::mem::take(&mut self.mesh);
+        let Objects { mut mesh, numbers } = self.with_beside(Objects { mesh, numbers });
         let flat = |ids| self.parts.flat(ids);
-        let surfaces = Surfaces::new(&mut self.mesh, &objects, (&self.bvh, &flat), plan);
+        let surfaces = Surfaces::new(&mut mesh, &numbers, (&self.bvh, &flat), plan);
         self.tell_turned(surfaces.turned, surfaces.faced);
+        if self.beside.is_some() {
+            self.whole = Some(mesh.clone());
+            mesh.positions.truncate(own[0]);
+            mesh.normals.truncate(own[0]);
+            mesh.uvs.truncate(own[0]);
+            mesh.indices.truncate(own[1]);
+        }
+        self.mesh = mesh;
         self.surfaces = Some(surfaces);
     }
 
@@ -129,19 +169,32 @@ impl Ground {
         some: impl Iterator<Item = usize>,
         plan: &Orientation,
     ) -> Vec<usize> {
-        let mut mesh = self.mesh.clone();
-        let objects = self.parts.objects(&mesh).numbers();
+        let numbers = self.parts.objects(&self.mesh).numbers();
+        let mesh = self.mesh.clone();
+        let Objects { mut mesh, numbers } = self.with_beside(Objects { mesh, numbers });
         let tree: (_, Flat<'_>) = (&self.bvh, &|ids| self.parts.flat(ids));
-        let surfaces = Surfaces::new(&mut mesh, &objects, tree, plan);
+        let surfaces = Surfaces::new(&mut mesh, &numbers, tree, plan);
         some.filter(|&index| surfaces.is_inside(tree, &mesh, points[index]))
             .collect()
+    }
+
+    /// The scene with what touches it.
+    fn with_beside(&self, mut own: Objects) -> Objects {
+        let beside = self.beside.iter();
+        beside.for_each(|beside| own.push(&beside.objects));
+        own
+    }
+
+    /// The mesh that [`surfaces`](Self::surfaces) are of: of the scene, and then of what touches it.
+    pub fn whole(&self) -> &Mesh {
+        self.whole.as_ref().unwrap_or(&self.mesh)
     }
 
     /// Kinds of the triangles, after [`Ground::face`].
     pub fn kinds(&self) -> &[Surface] {
         self.surfaces
             .as_ref()
-            .map_or(&[], |surfaces| &surfaces.kinds)
+            .map_or(&[], |surfaces| &surfaces.kinds[..self.mesh.indices.len()])
     }
 
     /// Adds the geometry to the key of a job.
@@ -230,6 +283,14 @@ impl Ground {
     }
 }
 
+/// The box of a scene in the world.
+pub fn extent(scene: &Scene) -> Option<Extent> {
+    Extent::of(scene).map(|own| Extent {
+        low: scene.origin + own.low,
+        high: scene.origin + own.high,
+    })
+}
+
 /// Bends all meshes, so that lines of sight over a round earth are straight.
 fn bend(args: &VisibleArgs, loaded: &mut Loaded) -> Result<Curvature, Failure> {
     let raster = loaded.raster.as_ref();
@@ -276,7 +337,7 @@ fn bend(args: &VisibleArgs, loaded: &mut Loaded) -> Result<Curvature, Failure> {
 ///
 /// # Errors
 /// The scene has no mesh, or more vertices than a PLY file can hold.
-fn mesh(scene: &Scene, creases: bool) -> Result<(Mesh, usize), Failure> {
+pub fn mesh(scene: &Scene, creases: bool) -> Result<(Mesh, usize), Failure> {
     let mut all = Mesh::default();
     let (mut spheres, mut curves, mut copies) = (0, 0, 0);
     for shape in &scene.shapes {

@@ -265,7 +265,7 @@ impl Baking for HorizonArgs {
         let azimuths = self.degrees(self.even()?);
         let mut ground = bake.ground(&mut files, None)?;
         let up = ground.up(self.places.up)?;
-        Asked::new(&self.raster, &self.places).of(&ground.loaded, up)?;
+        Asked::new(&self.raster, &self.places).of((&ground.loaded, ground.extent()), up)?;
         let places = Places::new(&self.places, &mut ground, up)?;
         let compass = Orientation::new(up, self.places.north.degrees()).map_err(Failure::usage)?;
         let sensors = &places.sensors;

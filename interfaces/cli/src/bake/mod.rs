@@ -15,17 +15,18 @@
 
 mod ao;
 pub mod chunks;
+pub mod city;
 mod command;
 mod factors;
 mod files;
-mod ground;
+pub mod ground;
 mod horizon;
 pub mod map;
 pub mod merge;
 mod neighbours;
 mod parts;
 mod places;
-mod raster;
+pub mod raster;
 pub mod site;
 mod sun;
 mod terrain;

@@ -45,6 +45,12 @@ impl Parts {
         Self { runs, shapes }
     }
 
+    /// Adds a shape whose triangles come last and have no names.
+    pub fn push_unnamed(&mut self, triangles: usize) {
+        let first = self.shapes.last().map_or(0, |[first, count]| first + count);
+        self.shapes.push([first, triangles as u32]);
+    }
+
     /// Names of a triangle.
     pub fn part(&self, triangle: usize) -> Option<&Part> {
         let run = self.runs.partition_point(|(end, _)| *end <= triangle);

@@ -73,11 +73,12 @@ impl Places {
         let mut places = Self {
             sensors: Sensors::default(),
             plan,
-            only: args
-                .only
-                .as_ref()
-                .map(|name| object(name, ground))
-                .transpose()?,
+            only: match (&args.only, &ground.around) {
+                (Some(name), _) => Some(object(name, ground)?),
+                // A grid covers the scene, and not what touches it.
+                (None, Some(_)) if args.grid.is_some() => Some(tree_of(ground, |_| true)?),
+                (None, _) => None,
+            },
         };
         let units = |metres: f64| metres / args.units.metres();
         let placement = &args.placement;
@@ -103,7 +104,7 @@ impl Places {
             let sensors = Sensors::on_surfaces(
                 &ground.bvh,
                 &|ids| ground.parts.flat(ids),
-                (&ground.mesh, surfaces),
+                (ground.whole(), surfaces),
                 triangles,
                 &options,
                 &level,
@@ -149,7 +150,8 @@ impl Places {
         }
         let level = Orientation::new(up, 0.0).map_err(Failure::usage)?;
         let group = |triangle: u32| groups.of_triangle[triangle as usize];
-        let tree: (_, Flat<'_>) = (&ground.bvh, &|ids| ground.parts.flat(ids));
+        let is_own = |triangle: &u32| (*triangle as usize) < ground.mesh.indices.len();
+        let tree: (_, Flat<'_>) = (&ground.bvh, &|ids| ground.parts.flat(ids).filter(is_own));
         let (triangles, ambiguous) = sensors.locate(tree, &ground.mesh, &group, &level);
         if ambiguous > 0 {
             say(format_args!(
@@ -167,14 +169,19 @@ impl Places {
 fn object(name: &str, ground: &Ground) -> Result<(Bvh, Vec<u32>), Failure> {
     let names = ground.parts.objects(&ground.mesh);
     let is_own = |triangle: &u32| names.name(*triangle as usize) == name;
-    let triangles: Vec<u32> = (0..ground.mesh.indices.len() as u32)
-        .filter(is_own)
-        .collect();
-    if triangles.is_empty() {
+    let found = tree_of(ground, is_own)?;
+    if found.1.is_empty() {
         let some = names.some(8).join(", ");
         let reason = format!("--only: there is no object {name:?}; some are {some}");
         return Err(Failure::Usage(reason));
     }
+    Ok(found)
+}
+
+/// Tree of some triangles of the mesh, and their numbers.
+fn tree_of(ground: &Ground, is_own: impl Fn(&u32) -> bool) -> Result<(Bvh, Vec<u32>), Failure> {
+    let triangles = 0..ground.mesh.indices.len() as u32;
+    let triangles: Vec<u32> = triangles.filter(is_own).collect();
     let indices = triangles.iter().map(|&i| ground.mesh.indices[i as usize]);
     Ok((tree(&ground.mesh.positions, indices.collect())?, triangles))
 }

@@ -32,16 +32,18 @@ impl<'a> Asked<'a> {
         }
     }
 
-    /// The place of a scene that was read. Settles unit and north.
-    pub fn of(&self, loaded: &Loaded, up: UpAxis) -> Result<Option<Site>, Failure> {
-        let scene = &loaded.scene;
+    /// The place of a scene that was read and is so large. Settles unit and north.
+    pub fn of(
+        &self,
+        (loaded, extent): (&Loaded, Option<Extent>),
+        up: UpAxis,
+    ) -> Result<Option<Site>, Failure> {
         let raster = loaded.raster.as_ref();
         let own = raster.and_then(|raster| raster.grid.crs.as_ref());
-        let middle =
-            Extent::of(scene).map(|extent| scene.origin + extent.low.midpoint(extent.high));
+        let middle = extent.map(|all| all.low.midpoint(all.high));
         let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
         let middle = plan.local(middle.unwrap_or_default().to_array());
-        self.settle(&scene.name, own, middle)
+        self.settle(&loaded.scene.name, own, middle)
     }
 
     /// The place of a scene whose middle is known, to the east, to the north and up.

@@ -7,13 +7,14 @@ use antumbra_lab::count;
 use antumbra_load::MemorySize;
 use antumbra_raster::is_raster;
 use antumbra_terrain::Tile;
-use antumbra_tiles::Index;
+use antumbra_tiles::{City, Index, Piece};
 use clap::Parser;
 
 use super::bill::{self, Rates};
 use super::{Bill, Head, Input, PLAN, Part, Plan, Task, checksum, from, line, sum_text};
 use crate::args::{Cli, Command, PlanArgs};
 use crate::bake::BakeCommand;
+use crate::bake::city::is_city;
 use crate::bake::tile::{self, is_index};
 use crate::exit::{Failure, tell};
 use crate::farm::{check_flags, is_built_in};
@@ -61,6 +62,7 @@ pub fn planned(args: &PlanArgs, memory: MemorySize) -> Result<Plan, Failure> {
         return Err(Failure::Usage(reason));
     }
     let tasks = match is_index(&args.scene) {
+        true if is_city(&args.scene) => of_files(args, &mut head)?,
         true => of_tiles(args, memory, &mut head)?,
         false => of_shards(args, memory, &mut head)?,
     };
@@ -230,6 +232,37 @@ fn of_shards(args: &PlanArgs, memory: MemorySize, head: &mut Head) -> Result<Vec
         }
     };
     Ok((0..args.tasks).map(task).collect())
+}
+
+/// Files of a city.
+fn of_files(args: &PlanArgs, head: &mut Head) -> Result<Vec<Task>, Failure> {
+    let Command::Bake(bake) = parse(line(&args.scene, &args.command), &["-o", "0.csv"])? else {
+        return Err(Failure::usage("files of a city are for sun"));
+    };
+    let mut common = settle_files(&bake, &mut head.command)?;
+    bake.args().0.check_city()?;
+    bake.args().0.check()?;
+    let city = City::read(&args.scene)?;
+    let (_, xxh3) = checksum(&args.scene)?;
+    let path = head.scene.clone();
+    common.push(Input { path, xxh3 });
+    head.levels = vec![city.files.len()];
+    head.bill.bytes_read = city.files.iter().map(|file| file.bytes).sum();
+    let task = |(number, file): (usize, &Piece)| {
+        let id = format!("f{number:05}");
+        let path = from(&args.output, &file.path)?;
+        let xxh3 = sum_text(file.xxh3);
+        Ok(Task {
+            output: format!("{id}.csv"),
+            id,
+            part: Part::File(number),
+            after: Vec::new(),
+            inputs: [&common[..], &[Input { path, xxh3 }]].concat(),
+            seconds: None,
+            memory: None,
+        })
+    };
+    city.files.iter().enumerate().map(task).collect()
 }
 
 /// Squares of a raster, and what they are made of.

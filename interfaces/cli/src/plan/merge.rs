@@ -10,7 +10,7 @@ use super::{PLAN, Part, Plan, State};
 use crate::args::MergeArgs;
 use crate::bake::{self, tile};
 use crate::exit::{Failure, tell};
-use crate::input::check_answers;
+use crate::input::{self, check_answers};
 use crate::output::{Files, is_one_of};
 use crate::{archive, interrupt};
 
@@ -46,9 +46,14 @@ pub fn join(size: [usize; 2], parts: &[VrtTile], memory: MemorySize) -> Result<V
 }
 
 impl Plan {
-    /// Refuses outputs as which tiles cannot be joined.
+    /// Refuses outputs as which results cannot be joined.
     pub fn check_outputs(&self, outputs: &[PathBuf]) -> Result<(), Failure> {
+        let is_city = self
+            .tasks
+            .iter()
+            .any(|task| matches!(task.part, Part::File(_)));
         let (known, reason) = match self.head.bands.len() {
+            0 if is_city => (&["csv"][..], "tables of a city are joined as a .csv"),
             0 => return Ok(()),
             1 => (
                 &EXTENSIONS[..],
@@ -65,6 +70,29 @@ impl Plan {
     }
 }
 
+/// Writes tables one after the other, with the names of columns once.
+fn join_tables(tables: &[PathBuf], output: &Path) -> Result<(), Failure> {
+    let _writing = interrupt::writing();
+    let mut failure = None;
+    let written = atomic_write(output, |file| {
+        for (number, table) in tables.iter().enumerate() {
+            let text = input::text(table).map_err(|error| {
+                failure = Some(error);
+                std::io::Error::from(std::io::ErrorKind::Other)
+            })?;
+            let rows = text.split_once('\n').map_or("", |(_, rows)| rows);
+            let own = if number == 0 { &text[..] } else { rows };
+            file.write_all(own.as_bytes())?;
+        }
+        Ok(())
+    });
+    failure.map_or(Ok(()), Err)?;
+    written?;
+    let (number, output) = (tables.len(), output.display());
+    tell(format_args!("joined {number} tables; wrote {output}"));
+    Ok(())
+}
+
 /// Joins the results of a plan. Returns the parts of a rendering or a bake, which their own command joins.
 pub fn merge(args: &MergeArgs, memory: MemorySize) -> Result<Option<Vec<PathBuf>>, Failure> {
     let [path] = &args.parts[..] else {
@@ -72,7 +100,7 @@ pub fn merge(args: &MergeArgs, memory: MemorySize) -> Result<Option<Vec<PathBuf>
     };
     let plan = Plan::read(path, &[])?;
     plan.check_outputs(&args.output)?;
-    let (mut paths, mut tiles) = (Vec::new(), Vec::new());
+    let (mut paths, mut tiles, mut tables) = (Vec::new(), Vec::new(), Vec::new());
     for task in &plan.tasks {
         interrupt::check()?;
         if plan.state(task, true)? != State::Done {
@@ -86,6 +114,7 @@ pub fn merge(args: &MergeArgs, memory: MemorySize) -> Result<Option<Vec<PathBuf>
         match task.part {
             Part::Sweep { .. } => {}
             Part::Shard(_) => paths.push(path),
+            Part::File(_) => tables.push(path),
             Part::Tile([column, row, columns, rows]) => tiles.push(VrtTile {
                 path,
                 at: [column, row],
@@ -105,7 +134,13 @@ pub fn merge(args: &MergeArgs, memory: MemorySize) -> Result<Option<Vec<PathBuf>
         files.writes("--output", output)?;
     }
     files.check()?;
-    let raster = tile::open(&plan.beside(&plan.head.scene), memory)?;
+    if !tables.is_empty() {
+        for output in &args.output {
+            join_tables(&tables, output)?;
+        }
+        return Ok(None);
+    }
+    let raster = tile::open(&plan.scene(), memory)?;
     let whole = raster.index().whole();
     let grid = raster.grid(&whole)?;
     let _writing = interrupt::writing();

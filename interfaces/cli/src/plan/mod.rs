@@ -97,6 +97,8 @@ enum Part {
     Sweep { tile: [usize; 4], quarter: usize },
     /// One of some shares of the work.
     Shard([u32; 2]),
+    /// Sensors on a file of a city.
+    File(usize),
 }
 
 /// A file and its checksum: XXH3, 64 bits, hexadecimal.

@@ -18,8 +18,9 @@ use antumbra_tiles::Indexed;
 
 use super::make::parse;
 use super::merge::join;
-use super::{Input, Part, Plan, RECEIPT, Receipt, State, Task, checksum, from, sum_text};
+use super::{Input, Part, Plan, RECEIPT, Receipt, State, Task, checksum, from, line, sum_text};
 use crate::args::{Command, RunArgs};
+use crate::bake::city::Store;
 use crate::bake::tile::{self, TileWork};
 use crate::bake::{self, run_tile};
 use crate::exit::{Failure, Loudness, quietly, tell};
@@ -142,6 +143,7 @@ impl Runner<'_> {
             Part::Tile(tile) => self.tile(task, tile_of(tile), (&own, &scratch.0))?,
             Part::Sweep { tile, quarter } => self.sweep(task, tile_of(tile), (quarter, &own))?,
             Part::Shard(shard) => self.shard(shard, (&own, &scratch.0))?,
+            Part::File(number) => self.file(number, &own)?,
         }
         if let Some(raster) = self.raster.get() {
             for number in raster.used_files() {
@@ -193,7 +195,7 @@ impl Runner<'_> {
         if let Some(raster) = self.raster.get() {
             return Ok(raster);
         }
-        let raster = tile::open(&self.plan.beside(&self.plan.head.scene), self.memory)?;
+        let raster = tile::open(&self.plan.scene(), self.memory)?;
         Ok(self.raster.get_or_init(|| raster))
     }
 
@@ -261,6 +263,20 @@ impl Runner<'_> {
             .collect();
         let work = TileWork::new(self.raster()?, tile, (Some(part), &ahead));
         self.bake(&work, Path::new("tile.tif"))
+    }
+
+    fn file(&self, number: usize, output: &Path) -> Result<(), Failure> {
+        let index = self.plan.scene();
+        let store = Store::open(&index, self.memory)?;
+        let missing = || Failure::Data(format!("{}: it has no file {number}", index.display()));
+        let piece = store.city.files.get(number).ok_or_else(missing)?;
+        let line = line(&piece.path, &self.plan.head.command);
+        match parse(line, &["--city", &text(&index), "-o", &text(output)])? {
+            Command::Bake(bake) => quietly(Loudness::Quiet, || {
+                bake::run(bake.args().0, self.memory, None)
+            }),
+            _ => Err(Failure::usage("a task of files is a bake")),
+        }
     }
 
     fn shard(

@@ -1,11 +1,13 @@
-//! `antumbra index`: height rasters of many files as one.
+//! `antumbra index`: height rasters of many files as one, and meshes.
 
 use antumbra_lab::count;
-use antumbra_load::raster_warnings;
+use antumbra_load::{MemorySize, raster_warnings};
 use antumbra_raster::Parts;
 use antumbra_tiles::Index;
 
 use crate::args::IndexArgs;
+use crate::bake::city;
+use crate::bake::raster::is_raster;
 use crate::bake::tile::is_index;
 use crate::exit::{Failure, tell};
 use crate::output::Files;
@@ -13,12 +15,15 @@ use crate::progress::Progress;
 use crate::scenes;
 
 /// Runs the command.
-pub fn survey(args: &IndexArgs) -> Result<(), Failure> {
+pub fn survey(args: &IndexArgs, memory: MemorySize) -> Result<(), Failure> {
     let output = &args.output;
     if !is_index(output) {
         return Err(Failure::name(output, "wanted a name that ends with .index"));
     }
-    let rasters = antumbra_raster::files(&args.rasters);
+    if !is_raster(&args.files[..1]) {
+        return survey_city(args, memory);
+    }
+    let rasters = antumbra_raster::files(&args.files);
     let rasters = rasters.map_err(|error| Failure::Scene(error.to_string()))?;
     let mut files = Files::default();
     files.reads_all(&rasters)?;
@@ -47,5 +52,23 @@ pub fn survey(args: &IndexArgs) -> Result<(), Failure> {
         );
     }
     tell(format_args!("{text}"));
+    Ok(())
+}
+
+/// The index of meshes.
+fn survey_city(args: &IndexArgs, memory: MemorySize) -> Result<(), Failure> {
+    let mut files = Files::default();
+    files.reads_all(&args.files)?;
+    files.writes("--output", &args.output)?;
+    files.check()?;
+    args.threads.start()?;
+    let city = city::index(&args.files, memory)?;
+    city.write(&args.output)?;
+    tell(format_args!(
+        "{}: {} files are one scene of {} triangles",
+        args.output.display(),
+        city.files.len(),
+        count(city.triangles)
+    ));
     Ok(())
 }

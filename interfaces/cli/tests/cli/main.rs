@@ -17,7 +17,7 @@
 //! - `occlusion`: `ao`;  `sunlight`: `sun`;  `sight`: `visible`
 //! - `terrain`: height rasters and viewsheds;  `mapping`: maps of their cells;  `around`: terrain around a scene;  `placing`: sensors on surfaces, and times of `sun`
 //! - `grouping`: results by object and facade, elevations, moving shadows; `factors`;  `horizons`: `horizon`
-//! - `plans`: tiles and shares of jobs
+//! - `plans`: tiles and shares of jobs;  `cities`: scenes in many files
 //! - `book`: links, tables and code of the pages for readers
 //! - `looks`: meshes with materials, camera flags, layers, pictures for displays
 //! - `cameras`: cameras in `info` and `ao`, and light from images around a mesh
@@ -30,6 +30,7 @@ mod bad_scenes;
 mod benching;
 mod book;
 mod cameras;
+mod cities;
 mod damaged;
 mod describing;
 mod farming;

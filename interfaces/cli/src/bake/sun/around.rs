@@ -53,8 +53,8 @@ pub fn check(args: &SunArgs) -> Result<(), Failure> {
 fn extent(ground: &Ground, up: UpAxis) -> Result<Extent, Failure> {
     let scene = &ground.loaded.scene;
     let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
-    let own = Extent::of(scene).into_iter();
-    let corners = own.flat_map(|own| [own.low, own.high].map(|corner| scene.origin + corner));
+    let own = ground.extent().into_iter();
+    let corners = own.flat_map(|own| [own.low, own.high]);
     let found = Extent::around(corners.map(|corner| plan.local(corner.to_array())));
     found.ok_or_else(|| Failure::scene(&scene.name, "it is empty"))
 }

@@ -27,6 +27,7 @@ use antumbra_bake::{
 use antumbra_tiles::Indexed;
 use clap::{ArgGroup, Args};
 
+use super::city::Around;
 use super::command::{Bake, Baking, Done, Figure, Named};
 use super::files::Format;
 use super::ground::Ground;
@@ -109,6 +110,12 @@ pub struct SunArgs {
     /// the scene casts shadows.
     #[arg(long, value_name = "RASTER", num_args = 1.., help_heading = heading::SUN)]
     pub terrain: Vec<PathBuf>,
+    /// Meshes around the scene, which cast shadows
+    ///
+    /// The index of a city in many files, by `antumbra index`. Those that touch the scene are read with it, and others when a ray may reach
+    /// them, so that a city may be larger than memory. Results are as if all were one file. If the scene is one of the files, it counts once.
+    #[arg(long, value_name = "INDEX", conflicts_with = "cells", help_heading = heading::SUN)]
+    pub city: Option<PathBuf>,
     /// Latitude, south negative [default: by --crs]
     ///
     /// If absent: the middle of the scene in its coordinate system (--crs, or the one in a GeoTIFF), or else the place of --epw.
@@ -246,6 +253,7 @@ impl Baking for SunArgs {
     fn files(&self) -> [Vec<Named<'_>>; 2] {
         let mut read = self.places.files().to_vec();
         read.push(("--epw", self.epw.as_deref()));
+        read.push(("--city", self.city.as_deref()));
         read.extend(self.terrain.iter().map(|path| ("--terrain", Some(&**path))));
         let written = vec![
             ("--hourly", self.hourly.as_deref()),
@@ -268,6 +276,16 @@ impl Baking for SunArgs {
         })
     }
 
+    fn check_city(&self) -> Result<(), Failure> {
+        let is_on_files = self.places.vertices || self.places.placement.surfaces.is_some();
+        let reason = match (is_on_files, &self.city) {
+            (false, _) => "sensors of a city are on its files: --vertices or --surfaces",
+            (true, Some(_)) => "--city: it is the scene of the plan",
+            (true, None) => return Ok(()),
+        };
+        Err(Failure::usage(reason))
+    }
+
     fn bake(&self, bake: &Bake<'_>, mut files: Files) -> Result<(), Failure> {
         around::check(self)?;
         let begin = Instant::now();
@@ -283,11 +301,13 @@ impl Baking for SunArgs {
             (!self.terrain.is_empty()).then(|| bake.terrain_of(&self.terrain, &mut files));
         let terrain = terrain.transpose()?;
         terrain.iter().for_each(Terrain::tell_read);
-        let mut ground = bake.ground(&mut files, None)?;
+        let mut ground = bake.ground_in(&mut files, self.city.as_deref())?;
         let up = ground.up(self.places.up)?;
         let site = match &terrain {
             Some(terrain) => around::settle(self, (&ground, up), terrain)?,
-            None => Asked::new(&self.raster, &self.places).of(&ground.loaded, up)?,
+            None => {
+                Asked::new(&self.raster, &self.places).of((&ground.loaded, ground.extent()), up)?
+            }
         };
         let (when, sunlight) = When::at(self, weather.as_ref(), site, up)?;
         let mut frames = self.frames.iter();
@@ -311,7 +331,19 @@ impl Baking for SunArgs {
             let below = [below, sensors.points.len()];
             figures = Some(around::figures(terrain, &ground, around, below));
         }
-        let done = bake.compute(&job, &ground, &ground.bvh)?;
+        let city = ground.around.as_ref();
+        let load = city.map(Around::loader);
+        let pieces = city.zip(load.as_ref());
+        let pieces = pieces.map(|(city, load)| city.pieces(load)).transpose()?;
+        if let Some(pieces) = &pieces {
+            job = job.beside(pieces);
+        }
+        let done = bake.compute(&job, &ground, &ground.bvh);
+        let done = done.map_err(|failure| match city {
+            Some(city) => city.failure(failure),
+            None => failure,
+        })?;
+        city.into_iter().for_each(Around::tell);
         let baked = Baked {
             name: &ground.loaded.scene.name,
             mesh: Some((&ground, &places)),

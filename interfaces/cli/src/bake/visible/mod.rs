@@ -200,7 +200,7 @@ impl Baking for VisibleArgs {
         }
         let ground = bake.ground(&mut files, self.curvature.then_some(self))?;
         let up = ground.up(self.up)?;
-        let site = asked(self).of(&ground.loaded, up)?;
+        let site = asked(self).of((&ground.loaded, ground.extent()), up)?;
         let plan = Orientation::new(up, 0.0).map_err(Failure::usage)?;
         let points = Points::read(self, &ground, &plan)?;
         points.warn_of_far_ones(self, &ground.bvh.bounds(), ground.local);
