@@ -10,6 +10,7 @@ use antumbra_load::{Extent, Loaded, MemorySize};
 use antumbra_scene::{Geometry as Surface, Shape, TriangleMesh};
 use antumbra_tiles::{Box3, City, Piece, boxes_around, checksum};
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::ground;
 use super::parts::Parts;
@@ -307,42 +308,53 @@ fn touch(a: &Box3, b: &Box3, slack: f32) -> bool {
 
 /// The index of mesh files, which are all read twice: their coordinates have one origin, which depends on all of them.
 pub fn index(files: &[PathBuf], memory: MemorySize) -> Result<City, Failure> {
-    let mut extent: Option<Extent> = None;
-    let mut up = None;
-    for path in files {
+    let read = files.par_iter();
+    let read = read.map(|path| {
         let loaded = scenes::load_from(path, DVec3::ZERO, memory)?;
-        let axis = loaded.up.axis;
-        if *up.get_or_insert(axis) != axis {
-            let reason = format!(
-                "{axis} is up, {}, and another axis in files before it",
-                loaded.up.reason
-            );
-            return Err(Failure::scene(path.display().to_string(), reason));
-        }
-        let own = Extent::of(&loaded.scene).into_iter();
-        let corners = own.chain(extent).flat_map(|own| [own.low, own.high]);
-        extent = Extent::around(corners.map(|corner| corner.to_array()));
+        Ok((Extent::of(&loaded.scene), loaded.up, loaded.warnings))
+    });
+    let read: Vec<_> = read.collect::<Result<_, Failure>>()?;
+    for warning in read.iter().flat_map(|(_, _, warnings)| warnings) {
+        tell(format_args!("{warning}"));
     }
-    let origin = extent.map_or(DVec3::ZERO, |extent| extent.local_origin());
-    let mut city = City {
-        origin: origin.to_array(),
-        bounds: [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]],
-        triangles: 0,
-        files: Vec::new(),
-    };
-    for path in files {
+    let axis = |file: usize| read[file].1.axis;
+    if let Some(other) = (1..files.len()).find(|&file| axis(file) != axis(0)) {
+        let reason = format!(
+            "{} is up, {}, and {} in files before it",
+            axis(other),
+            read[other].1.reason,
+            axis(0)
+        );
+        return Err(Failure::scene(files[other].display().to_string(), reason));
+    }
+    let extents = read.iter().filter_map(|(extent, _, _)| *extent);
+    let corners = extents.flat_map(|own| [own.low, own.high].map(|corner| corner.to_array()));
+    let origin = Extent::around(corners).map_or(DVec3::ZERO, |extent| extent.local_origin());
+    let piece = |path: &PathBuf| {
         let (bytes, xxh3) = checksum(path)?;
         let mut found = triangles(&load(path, origin, memory)?.mesh);
-        let boxes = boxes_around(&mut found);
-        city.bounds = boxes.iter().fold(city.bounds, |all, own| union(&all, own));
-        city.triangles += found.len() as u64;
-        city.files.push(Piece {
+        if found.is_empty() {
+            let reason = "it has no triangle with finite corners";
+            return Err(Failure::scene(path.display().to_string(), reason));
+        }
+        Ok(Piece {
             path: std::path::absolute(path).map_err(Failure::work)?,
             bytes,
             xxh3,
             triangles: found.len() as u64,
-            boxes,
-        });
-    }
-    Ok(city)
+            boxes: boxes_around(&mut found),
+        })
+    };
+    let files: Vec<Piece> = files
+        .par_iter()
+        .map(piece)
+        .collect::<Result<_, Failure>>()?;
+    let mut boxes = files.iter().flat_map(|file| &file.boxes);
+    let first = boxes.next().copied().unwrap_or_default();
+    Ok(City {
+        origin: origin.to_array(),
+        bounds: boxes.fold(first, |all, own| union(&all, own)),
+        triangles: files.iter().map(|file| file.triangles).sum(),
+        files,
+    })
 }

@@ -127,13 +127,14 @@ impl Runner<'_> {
         let result = plan.result(task);
         let scratch = Scratch::new(&plan.folder(), &task.id)?;
         // The unfinished work of a share has a name of its own, with which the same task goes on, unless it goes on elsewhere.
-        let lock = match task.part {
-            Part::Shard(_) => Some(File::create(
-                plan.folder().join(format!(".{}.lock", task.id)),
-            )),
-            _ => None,
+        let lock = |end: &str| match task.part {
+            Part::Shard(_) => {
+                File::create(plan.folder().join(format!(".{}.{end}", task.id))).map(Some)
+            }
+            _ => Ok(None),
         };
-        let lock = lock.transpose().map_err(Failure::work)?;
+        let [lock, last] = [lock("lock"), lock("last")];
+        let (lock, last) = (lock.map_err(Failure::work)?, last.map_err(Failure::work)?);
         let own = match lock.as_ref().is_some_and(|lock| lock.try_lock().is_ok()) {
             true => plan.folder().join(format!("unfinished.{}", task.output)),
             false => scratch.0.join(&task.output),
@@ -158,6 +159,9 @@ impl Runner<'_> {
         let (bytes, xxh3) = checksum(&own)?;
         let key = plan.key(task)?;
         let _writing = interrupt::writing();
+        // Runs of a share note other times, so that the result of one must not have the receipt of another. Where files have no locks,
+        // that is found out by `check`.
+        let _ = last.as_ref().map(File::lock);
         if let Some(other) = plan.receipt(&task.id).filter(|other| other.key == key) {
             let is_there = checksum(&result)
                 .is_ok_and(|found| found == (other.bytes, other.output.xxh3.clone()));
