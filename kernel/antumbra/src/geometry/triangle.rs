@@ -136,7 +136,7 @@ impl TriangleBlock {
         edges: &Edges<Vector<S>>,
     ) -> Verdict<Truths<S>> {
         let ends = Ends {
-            tnear: Vector::<S>::splat(simd, ray.tnear),
+            tnear: Vector::<S>::splat(simd, ray.tnear_of_vectors),
             tfar: Vector::<S>::splat(simd, limit),
         };
         edges.judge::<BLOCK>(simd, &ends)

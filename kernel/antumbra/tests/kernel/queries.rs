@@ -248,6 +248,66 @@ fn closed_intervals_hold_their_ends() {
     }
 }
 
+#[test]
+fn hits_next_to_zero_are_those_of_brute_force() {
+    let mut rng = Rng::new(126);
+    let tiny = [
+        0.0,
+        1e-45,
+        1e-42,
+        f32::MIN_POSITIVE,
+        3.0 * f32::MIN_POSITIVE,
+        1e-35,
+        1e-31,
+        1e-20,
+    ];
+    let (mut hits, mut ends) = (0, 0);
+    for round in 0..3000 {
+        let side = 10_f32.powi(rng.below(14) as i32 - 3);
+        let mut signed =
+            |list: &[f32]| list[rng.below(list.len())] * (rng.below(2) as f32 * 2.0 - 1.0);
+        // Triangles that are nearly in the plane from which rays begin.
+        let corners: Vec<[f32; 3]> = (0..12)
+            .map(|corner| {
+                let [x, y] = [[-1.0, -1.0], [1.0, -1.0], [0.0, 1.0]][corner % 3];
+                [x * side, y * side, signed(&tiny)]
+            })
+            .collect();
+        let rays: Vec<Ray> = (0..16)
+            .map(|_| {
+                let org = [
+                    0.1 * side * signed(&[0.0, 1.0]),
+                    0.2 * side * signed(&[0.0, 1.0]),
+                    signed(&tiny),
+                ];
+                let dir = [signed(&[0.0, 1e-3]), 0.0, signed(&[1.0, 1e-3, 1e3])];
+                Ray {
+                    tnear: signed(&tiny[..6]),
+                    ..Ray::new(org, dir)
+                }
+            })
+            .collect();
+        let indices = vec![[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11]];
+        let primitives =
+            Primitives::new(&[Geometry::triangles(&corners[..], indices)]).expect("a mesh");
+        let (bvh, brute) = (
+            Bvh::build(&primitives, &Recipe::default()).expect("a tree"),
+            antumbra::Brute::new(&primitives),
+        );
+        let batch = bvh.batch(&rays).intersect();
+        let occluded = bvh.batch(&rays).occluded();
+        for (index, ray) in rays.iter().enumerate() {
+            let wanted = brute.intersect(ray);
+            assert_eq!(bits(bvh.intersect(ray)), bits(wanted), "{round} {ray:?}");
+            assert_eq!(bits(batch[index]), bits(wanted), "{round} {ray:?}");
+            assert_eq!(occluded[index], wanted.is_some(), "{round} {ray:?}");
+            hits += usize::from(wanted.is_some());
+            ends += usize::from(wanted.is_some_and(|hit| hit.t.abs() <= f32::MIN_POSITIVE));
+        }
+    }
+    assert!(hits > 1000 && ends > 100, "{hits} {ends}");
+}
+
 /// One array for everything, with other numbers in between.
 fn interleaved(rays: &[Ray], stride: usize, rng: &mut Rng) -> Vec<f32> {
     let mut numbers: Vec<f32> = (0..stride * rays.len()).map(|_| rng.unit()).collect();
