@@ -20,7 +20,7 @@ use crate::output::Files;
 use crate::plan;
 use crate::render::check_image_names;
 
-/// Runs the command;
+/// Runs the command.
 pub fn run(command: &FarmCommand, memory: MemorySize) -> Result<(), Failure> {
     match command {
         FarmCommand::Slurm(args) => slurm::run(args, memory),

@@ -73,10 +73,10 @@
 //! not. Few lanes are left to be computed as defined. The triangle that a ray starts from is seldom one, because `m` is
 //! small there.
 //!
-//! An interval that begins next to 0, as that of a closed ray does, is compared as if it began there, since `tnear D` would be
-//! subnormal for triangles of ordinary size, which takes Intel's cores ten times as long. A lane that is surely hit then has
-//! a `t` of more than 0. A hit between such a `tnear` and 0 has a `T` of at least `tnear D` less roundings: `D` is at most
-//! `24 R²`, so while `R` is at most [`SMALL_REACH`] that is within [`SLACK`], and the lane is in doubt.
+//! An interval that begins next to 0, as with a closed ray, is compared as if it began there, since `tnear D` would be
+//! subnormal for triangles of ordinary size, which takes Intel's cores ten times as long. `D` is at most `24 R²`, so while `R` is
+//! at most [`SMALL_REACH`], `tnear D` is within [`SLACK`]: a lane that is surely hit has a `t` beyond such a `tnear`, and
+//! a lane with a hit between both is in doubt.
 //!
 //! Nothing overflows while `R` and `R / w` are within [`SANE`]; beyond, every lane is computed as defined. What
 //! underflows in `e` is nothing beside [`SMALL`]. What underflows in `tᵢ` or `T` is less than [`SLACK`], which the doubt
