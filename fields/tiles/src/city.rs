@@ -23,6 +23,8 @@ pub struct City {
     pub origin: [f64; 3],
     /// Box around all files, from the origin.
     pub bounds: Box3,
+    /// Name of the axis that is up, as `z`, if it is the same in all files.
+    pub up: Option<String>,
     /// Number of triangles.
     pub triangles: u64,
     /// Files in the order in which they were given.

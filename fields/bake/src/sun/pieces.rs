@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use antumbra::{Bvh, Geometry, Ray, Recipe, Visit};
+use antumbra::{Aabb, Bvh, Geometry, Ray, Recipe, Visit};
 use rayon::prelude::*;
 
 use crate::sight::visibility::{origin, ray_direction};
@@ -50,14 +50,14 @@ impl<'a> Pieces<'a> {
         load: &'a LoadPiece<'a>,
     ) -> Result<Self, antumbra::Error> {
         let wide = |(number, boxes): (usize, &[Box3])| {
-            let corners = boxes.as_flattened().as_flattened().iter();
-            let slack = SLACK * corners.fold(0.0, |most: f32, x| most.max(x.abs()));
+            let slack = SLACK * Aabb::around(boxes.as_flattened()).reach();
             let wide = boxes.iter();
             let wide = wide.map(|[low, high]| [low.map(|x| x - slack), high.map(|x| x + slack)]);
             (number, wide.collect())
         };
         let pieces: Vec<(usize, Vec<Box3>)> = pieces.into_iter().map(wide).collect();
-        let all = pieces.iter().map(|(_, boxes)| solid(&around(boxes)));
+        let all = pieces.iter();
+        let all = all.map(|(_, boxes)| solid(&Aabb::around(boxes.as_flattened())));
         Ok(Self {
             around: Bvh::build(&all.collect::<Vec<_>>(), &Recipe::fast())?,
             pieces,
@@ -180,17 +180,6 @@ impl<'a> Pieces<'a> {
     }
 }
 
-/// The box around boxes.
-fn around(boxes: &[Box3]) -> Box3 {
-    let nothing = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
-    boxes.iter().fold(nothing, |[low, high], own| {
-        [
-            [0, 1, 2].map(|axis| low[axis].min(own[0][axis])),
-            [0, 1, 2].map(|axis| high[axis].max(own[1][axis])),
-        ]
-    })
-}
-
 /// Whether a ray enters one of some boxes.
 fn enters(ray: &Ray, boxes: &[Box3]) -> bool {
     let inverse = ray.dir.map(|x| 1.0 / f64::from(x));
@@ -207,9 +196,10 @@ fn enters(ray: &Ray, boxes: &[Box3]) -> bool {
 }
 
 /// A box as triangles.
-fn solid(around: &Box3) -> Geometry<'static> {
-    let positions: [[f32; 3]; 8] =
-        std::array::from_fn(|corner| [0, 1, 2].map(|axis| around[corner >> axis & 1][axis]));
+fn solid(around: &Aabb) -> Geometry<'static> {
+    let positions: [[f32; 3]; 8] = std::array::from_fn(|corner| {
+        [0, 1, 2].map(|axis| [around.min, around.max][corner >> axis & 1][axis])
+    });
     let mut indices = Vec::new();
     for axis in 0..3 {
         // Two sides that face each other, of two triangles each.

@@ -1,12 +1,12 @@
 //! A city around a scene, in many files that are loaded when rays may reach them: `sun --city`.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use antumbra::{Bvh, Geometry, Recipe};
+use antumbra::{Aabb, Bvh, Geometry, Recipe};
 use antumbra_bake::{Error, Mesh, Pieces};
-use antumbra_load::{Extent, Loaded, MemorySize};
+use antumbra_load::{Extent, Loaded, MemorySize, Up, Upright};
 use antumbra_scene::{Geometry as Surface, Shape, TriangleMesh};
 use antumbra_tiles::{Box3, City, Piece, boxes_around, checksum};
 use glam::DVec3;
@@ -107,9 +107,11 @@ fn triangles(mesh: &Mesh) -> Vec<[[f32; 3]; 3]> {
     corners.filter(is_finite).collect()
 }
 
-/// Reads a file, with positions from an origin.
-fn load(path: &Path, origin: DVec3, memory: MemorySize) -> Result<Objects, Failure> {
-    let Loaded { scene, names, .. } = scenes::load_from(path, origin, memory)?;
+/// Reads a file, with positions from an origin, and which way is up in it.
+fn load(path: &Path, origin: DVec3, memory: MemorySize) -> Result<(Objects, Up), Failure> {
+    let Loaded {
+        scene, names, up, ..
+    } = scenes::load_from(path, origin, memory)?;
     let flat = scene.flattened();
     let flat = flat.map_err(|error| Failure::scene(&scene.name, error))?;
     let is_solid = |shape: &Shape| shape.alpha.is_none() && shape.shadow_alpha.is_none();
@@ -121,7 +123,7 @@ fn load(path: &Path, origin: DVec3, memory: MemorySize) -> Result<Objects, Failu
     }
     let (mesh, _) = ground::mesh(&flat, false)?;
     let numbers = Parts::new(&flat, &names).objects(&mesh).numbers();
-    Ok(Objects { mesh, numbers })
+    Ok((Objects { mesh, numbers }, up.axis))
 }
 
 impl Store {
@@ -164,7 +166,7 @@ impl Store {
             bytes -= files.remove(0).1.bytes();
         }
         let found = Arc::new(Content {
-            objects: load(&piece.path, self.city.origin.into(), self.memory)?,
+            objects: load(&piece.path, self.city.origin.into(), self.memory)?.0,
             tree: OnceLock::new(),
         });
         files.push((number, found.clone()));
@@ -212,13 +214,12 @@ impl Around {
     /// [mark](Pieces::mark) of everything, a tree of the scene has the origin offsets of a tree of everything.
     pub fn new(store: Arc<Store>, (path, mesh): (&Path, &Mesh)) -> Result<(Self, Beside), Failure> {
         let city = &store.city;
-        let real = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_path_buf());
         let path = real(path);
         let own = (city.files.iter()).position(|piece| real(&piece.path) == path);
         let boxes = boxes_around(&mut triangles(mesh));
-        let bounds = (boxes.iter()).fold(city.bounds, |all, own| union(&all, own));
-        let corners = bounds.as_flattened().iter();
-        let slack = NEAR * corners.fold(0.0, |most: f32, x| most.max(x.abs()));
+        let around = |boxes: &[Box3]| Aabb::around(boxes.as_flattened());
+        let bounds = around(&boxes).union(&around(&[city.bounds]));
+        let slack = NEAR * bounds.reach();
         let is_near = |piece: &Piece| {
             let touches = |a: &Box3| boxes.iter().any(|b| touch(a, b, slack));
             piece.boxes.iter().any(touches)
@@ -240,7 +241,7 @@ impl Around {
             around,
             Beside {
                 objects,
-                mark: Pieces::mark(bounds),
+                mark: Pieces::mark([bounds.min, bounds.max]),
             },
         ))
     }
@@ -251,6 +252,16 @@ impl Around {
         let corners =
             bounds.map(|corner| DVec3::from(*origin) + DVec3::from(corner.map(f64::from)));
         Extent::around(corners.into_iter().map(|corner| corner.to_array()))
+    }
+
+    /// Which way is up, if all files agree.
+    pub fn up(&self) -> Option<Upright> {
+        let name = self.store.city.up.as_deref();
+        let known = Up::ALL.iter().find(|(known, _)| Some(*known) == name);
+        known.map(|&(_, axis)| Upright {
+            axis,
+            reason: "as in all files of the city",
+        })
     }
 
     /// Gives the tree of a file to a job. [`Around::failure`] says why there is none.
@@ -294,11 +305,9 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn union(a: &Box3, b: &Box3) -> Box3 {
-    [
-        [0, 1, 2].map(|axis| a[0][axis].min(b[0][axis])),
-        [0, 1, 2].map(|axis| a[1][axis].max(b[1][axis])),
-    ]
+/// A file by whatever name.
+fn real(path: &Path) -> PathBuf {
+    path.canonicalize().unwrap_or_else(|_| path.to_path_buf())
 }
 
 /// Whether boxes are this near to each other.
@@ -308,52 +317,59 @@ fn touch(a: &Box3, b: &Box3, slack: f32) -> bool {
 
 /// The index of mesh files, which are all read twice: their coordinates have one origin, which depends on all of them.
 pub fn index(files: &[PathBuf], memory: MemorySize) -> Result<City, Failure> {
-    let read = files.par_iter();
-    let read = read.map(|path| {
+    let mut known = HashSet::new();
+    if let Some(twice) = files.iter().find(|path| !known.insert(real(path))) {
+        return Err(Failure::name(
+            twice,
+            "it is given twice, and would stand in its own light",
+        ));
+    }
+    let extent = |path: &PathBuf| {
         let loaded = scenes::load_from(path, DVec3::ZERO, memory)?;
-        Ok((Extent::of(&loaded.scene), loaded.up, loaded.warnings))
-    });
-    let read: Vec<_> = read.collect::<Result<_, Failure>>()?;
-    for warning in read.iter().flat_map(|(_, _, warnings)| warnings) {
-        tell(format_args!("{warning}"));
-    }
-    let axis = |file: usize| read[file].1.axis;
-    if let Some(other) = (1..files.len()).find(|&file| axis(file) != axis(0)) {
-        let reason = format!(
-            "{} is up, {}, and {} in files before it",
-            axis(other),
-            read[other].1.reason,
-            axis(0)
-        );
-        return Err(Failure::scene(files[other].display().to_string(), reason));
-    }
-    let extents = read.iter().filter_map(|(extent, _, _)| *extent);
-    let corners = extents.flat_map(|own| [own.low, own.high].map(|corner| corner.to_array()));
+        loaded
+            .warnings
+            .iter()
+            .for_each(|warning| tell(format_args!("{warning}")));
+        Ok(Extent::of(&loaded.scene))
+    };
+    let extents: Vec<_> = files
+        .par_iter()
+        .map(extent)
+        .collect::<Result<_, Failure>>()?;
+    let corners = extents.into_iter().flatten();
+    let corners = corners.flat_map(|own| [own.low, own.high].map(|corner| corner.to_array()));
     let origin = Extent::around(corners).map_or(DVec3::ZERO, |extent| extent.local_origin());
     let piece = |path: &PathBuf| {
         let (bytes, xxh3) = checksum(path)?;
-        let mut found = triangles(&load(path, origin, memory)?.mesh);
+        let (objects, up) = load(path, origin, memory)?;
+        let mut found = triangles(&objects.mesh);
         if found.is_empty() {
             let reason = "it has no triangle with finite corners";
             return Err(Failure::scene(path.display().to_string(), reason));
         }
-        Ok(Piece {
+        let piece = Piece {
             path: std::path::absolute(path).map_err(Failure::work)?,
             bytes,
             xxh3,
             triangles: found.len() as u64,
             boxes: boxes_around(&mut found),
-        })
+        };
+        Ok((piece, up))
     };
-    let files: Vec<Piece> = files
-        .par_iter()
-        .map(piece)
-        .collect::<Result<_, Failure>>()?;
-    let mut boxes = files.iter().flat_map(|file| &file.boxes);
-    let first = boxes.next().copied().unwrap_or_default();
+    let pieces = files.par_iter().map(piece);
+    let (files, ups): (Vec<Piece>, Vec<Up>) = pieces
+        .collect::<Result<Vec<_>, Failure>>()?
+        .into_iter()
+        .unzip();
+    let boxes: Vec<Box3> = files.iter().flat_map(|file| &file.boxes).copied().collect();
+    let Aabb { min, max } = Aabb::around(boxes.as_flattened());
     Ok(City {
         origin: origin.to_array(),
-        bounds: boxes.fold(first, |all, own| union(&all, own)),
+        bounds: [min, max],
+        up: ups
+            .iter()
+            .all(|up| *up == ups[0])
+            .then(|| ups[0].to_string()),
         triangles: files.iter().map(|file| file.triangles).sum(),
         files,
     })

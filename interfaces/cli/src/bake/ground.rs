@@ -69,6 +69,10 @@ impl Ground {
         };
         let around = city.map(|store| Around::new(store, (&names[0], &mesh)));
         let (around, beside) = around.transpose()?.unzip();
+        // One file may look as if another axis were up.
+        if let Some(up) = around.as_ref().and_then(Around::up) {
+            loaded.up = up;
+        }
         if let Some(Beside { objects, .. }) = &beside {
             parts.push_unnamed(objects.numbers.len());
         }
@@ -225,6 +229,10 @@ impl Ground {
             UpAxis::Y => Up::Y,
             UpAxis::Z => Up::Z,
         });
+        if asked.is_none() && self.around.as_ref().is_some_and(|city| city.up().is_none()) {
+            let reason = "--city: its files differ in which way is up; choose y or z with --up";
+            return Err(Failure::usage(reason));
+        }
         scenes::tell_read(&self.loaded, told);
         match (asked, self.loaded.up.axis) {
             (Some(axis), _) => Ok(axis),

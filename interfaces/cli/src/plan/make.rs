@@ -27,6 +27,10 @@ pub fn planned(args: &PlanArgs, memory: MemorySize) -> Result<Plan, Failure> {
         let reason = "a plan names its scene: tasks need a file, not the standard input";
         return Err(Failure::usage(reason));
     }
+    if !is_built_in(&args.scene) && !args.scene.exists() {
+        let scene = args.scene.display();
+        return Err(Failure::Usage(format!("there is no file {scene}")));
+    }
     let of_machine = |word: &&String| {
         ["--max-memory", "--threads"].contains(&word.split('=').next().unwrap_or_default())
     };

@@ -282,3 +282,76 @@ fn what_cannot_be_in_a_city_is_refused() {
         run.stderr
     );
 }
+
+#[test]
+fn files_that_differ_in_which_way_is_up_need_a_word() {
+    let place = Place::empty();
+    let ground = "v 0 0 0\nv 40 0 0\nv 40 40 0\nv 0 40 0\nf 1 2 3 4\n";
+    let sail = "v 50 10 5\nv 60 10 5\nv 50 20 25\nf 1 2 3\n";
+    place.write("ground.obj", ground);
+    place.write("sail.obj", sail);
+    let moved = "v 50 10 5\nv 60 10 5\nv 50 20 25\nf 5 6 7\n";
+    place.write("both.obj", format!("{ground}{moved}"));
+    let index = ["index", "ground.obj", "sail.obj", "-o", "city.index"];
+    place.run(&index).expect(0);
+    let day = [
+        "--lat",
+        "48",
+        "--lon",
+        "11",
+        "--from",
+        "2025-03-01",
+        "--to",
+        "2025-03-01",
+    ];
+    let sun = [&["--vertices"][..], &day].concat();
+    let city = ["sun", "ground.obj", "--city", "city.index", "-o", "a.csv"];
+    let run = place.run(&[&city[..], &sun].concat()).expect(2);
+    assert!(
+        run.stderr.contains("choose y or z with --up"),
+        "{}",
+        run.stderr
+    );
+    let sun = [&sun[..], &["--up", "z"]].concat();
+    place
+        .run(&[&["plan", "city.index", "-o", "plan.jsonl", "sun"][..], &sun].concat())
+        .expect(0);
+    place.run(&["run", "plan.jsonl"]).expect(0);
+    place
+        .run(&["merge", "plan.jsonl", "-o", "all.csv"])
+        .expect(0);
+    place
+        .run(&[&["sun", "both.obj", "-o", "both.csv"][..], &sun].concat())
+        .expect(0);
+    assert_eq!(place.rows("all.csv"), place.rows("both.csv"));
+    // With a city around it, a file is taken as the city is, whatever it looks like.
+    place
+        .run(&["index", "ground.obj", "-o", "one.index"])
+        .expect(0);
+    let run = place.run(
+        &[
+            &[
+                "sun",
+                "sail.obj",
+                "--city",
+                "one.index",
+                "-o",
+                "a.csv",
+                "--vertices",
+            ][..],
+            &day,
+        ]
+        .concat(),
+    );
+    assert!(
+        run.expect(0)
+            .stderr
+            .contains("z is up, as in all files of the city")
+    );
+    let run = place
+        .run(&["index", "ground.obj", "./ground.obj", "-o", "two.index"])
+        .expect(2);
+    assert!(run.stderr.contains("given twice"), "{}", run.stderr);
+    let run = place.run(&[&["plan", "none.index", "-o", "plan.jsonl", "sun"][..], &sun].concat());
+    assert!(run.expect(2).stderr.contains("there is no file none.index"));
+}
